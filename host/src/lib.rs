@@ -1,0 +1,16 @@
+//! The host side of blindgrasp: the simulated plant, the closed loop around the same tick that the microcontroller
+//! runs, scenes, and reports.
+
+/// The largest hand that the host loads: joints.
+pub const MAX_JOINTS: usize = 24;
+/// The largest hand that the host loads: fingertips.
+pub const MAX_FINGERS: usize = 5;
+
+/// A hand of any size, in the precision of the plant.
+pub type Hand = blindgrasp_shared::hand::Hand<f64, MAX_JOINTS, MAX_FINGERS>;
+/// A posture of a [`Hand`].
+pub type Posture = blindgrasp_shared::hand::Posture<f64, MAX_JOINTS, MAX_FINGERS>;
+
+pub mod plant;
+pub mod scene;
+pub mod sim;

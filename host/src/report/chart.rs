@@ -1,0 +1,303 @@
+//! A figure: panels above one another over one time axis, each with its legend at its side. Drawn by Plotters, once as
+//! a bitmap and once as SVG.
+
+use super::canvas::Canvas;
+use super::palette::{FAINT_INK, GRID, INK, Rgb};
+use super::{series, text};
+use plotters::coord::Shift;
+use plotters::coord::combinators::BindKeyPoints;
+use plotters::prelude::{
+    ChartBuilder, ChartContext, Circle, DashedLineSeries, DrawingArea, DrawingBackend, FontTransform,
+    IntoDrawingArea, IntoFont, LineSeries, PathElement, RGBColor, Ranged, SVGBackend, ShapeStyle, Text,
+    TextStyle, WHITE,
+};
+use plotters::coord::cartesian::Cartesian2d;
+use plotters::style::text_anchor::{HPos, Pos, VPos};
+use std::fmt::Display;
+use std::ops::Range;
+
+/// Sizes below are in pixels of the finished picture. Bitmaps are drawn this much larger and averaged down; SVG files,
+/// in which Plotters rounds to whole units, count in fractions of a pixel.
+const BITMAP_SCALE: i32 = 3;
+const SVG_SCALE: i32 = 4;
+
+const WIDTH: i32 = 960;
+const TITLE_HEIGHT: i32 = 46;
+const TIME_LABELS_HEIGHT: i32 = 46;
+const VALUE_LABELS_WIDTH: i32 = 74;
+const LEGEND_WIDTH: i32 = 172;
+const LEGEND_PITCH: i32 = 19;
+const LABEL_SIZE: i32 = 15;
+const TITLE_SIZE: i32 = 21;
+const LINE_WIDTH: f64 = 1.6;
+
+/// How a line is broken: pixels drawn and pixels left out.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Dash {
+    Solid,
+    Broken(i32, i32),
+}
+
+impl Dash {
+    /// The dashes of the `k`-th of several lines, so that lines that coincide still show.
+    pub(super) fn of(k: usize) -> Self {
+        [Self::Solid, Self::Broken(9, 4), Self::Broken(3, 3), Self::Broken(16, 5)][k % 4]
+    }
+}
+
+/// One signal.
+#[derive(Clone, Debug)]
+pub(super) struct Line {
+    pub(super) name: String,
+    pub(super) colour: Rgb,
+    pub(super) dash: Dash,
+    /// One value for each time of the figure, in the panel's unit; what is not finite is left out.
+    pub(super) values: Vec<f64>,
+}
+
+/// How values are laid out along the vertical axis.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) enum Axis {
+    /// Over this range, in the panel's unit.
+    Linear(Range<f64>),
+    /// Over these powers of ten; smaller values sit on the lower edge.
+    Decades(Range<f64>),
+}
+
+/// One coordinate system.
+#[derive(Clone, Debug)]
+pub(super) struct Panel {
+    /// Over the legend.
+    pub(super) heading: String,
+    /// What is drawn: the axis label without the unit.
+    pub(super) quantity: &'static str,
+    /// SI unit without prefix.
+    pub(super) unit: &'static str,
+    pub(super) axis: Axis,
+    pub(super) lines: Vec<Line>,
+}
+
+/// A whole figure.
+#[derive(Clone, Debug)]
+pub(super) struct Figure {
+    pub(super) title: String,
+    /// s
+    pub(super) times: Vec<f64>,
+    pub(super) panels: Vec<Panel>,
+}
+
+impl Figure {
+    /// The figure as a PNG file.
+    pub(super) fn png(&self) -> Result<Vec<u8>, String> {
+        let (width, height) = self.size(BITMAP_SCALE);
+        let mut canvas = Canvas::new(width as usize, height as usize);
+        let root = (&mut canvas).into_drawing_area();
+        self.draw(&root, BITMAP_SCALE)?;
+        drop(root);
+        canvas.reduced(BITMAP_SCALE as usize).png().map_err(reason)
+    }
+
+    /// The figure as an SVG file.
+    pub(super) fn svg(&self) -> Result<Vec<u8>, String> {
+        let (width, height) = self.size(SVG_SCALE);
+        let mut file = String::new();
+        let root = SVGBackend::with_string(&mut file, (width, height)).into_drawing_area();
+        self.draw(&root, SVG_SCALE)?;
+        drop(root);
+        // The size in which a viewer shows it; the view box keeps the fine units.
+        let fine = format!("width=\"{width}\" height=\"{height}\" viewBox");
+        let shown = self.size(1);
+        Ok(file.replacen(&fine, &format!("width=\"{}\" height=\"{}\" viewBox", shown.0, shown.1), 1).into_bytes())
+    }
+
+    /// Width and height.
+    pub(super) fn size(&self, scale: i32) -> (u32, u32) {
+        let panels: i32 = (0..self.panels.len()).map(|k| self.panel_height(k)).sum();
+        ((WIDTH * scale) as u32, ((TITLE_HEIGHT + panels + TIME_LABELS_HEIGHT) * scale) as u32)
+    }
+
+    fn panel_height(&self, k: usize) -> i32 {
+        let usual = match self.panels.len() {
+            0..=2 => 260,
+            3 => 205,
+            _ => 175,
+        };
+        let lines = self.panels.get(k).map_or(0, |panel| panel.lines.len() as i32);
+        usual.max((lines + 2) * LEGEND_PITCH)
+    }
+
+    fn draw<B: DrawingBackend>(&self, root: &DrawingArea<B, Shift>, scale: i32) -> Result<(), String> {
+        text::register_with_plotters();
+        root.fill(&WHITE).map_err(reason)?;
+        let title = letters(TITLE_SIZE, scale, INK).pos(Pos::new(HPos::Left, VPos::Center));
+        let corner = (VALUE_LABELS_WIDTH * scale, TITLE_HEIGHT / 2 * scale);
+        root.draw(&Text::new(shortened(&self.title, 72), corner, title)).map_err(reason)?;
+        let mut top = TITLE_HEIGHT;
+        for (k, panel) in self.panels.iter().enumerate() {
+            let last = k + 1 == self.panels.len();
+            let height = self.panel_height(k) + if last { TIME_LABELS_HEIGHT } else { 0 };
+            let (_, below) = root.split_vertically(top * scale);
+            let (area, _) = below.split_vertically(height * scale);
+            let (chart, legend) = area.split_horizontally((WIDTH - LEGEND_WIDTH) * scale);
+            self.draw_panel(panel, &chart, last, scale)?;
+            draw_legend(panel, &legend, scale)?;
+            top += height;
+        }
+        root.present().map_err(reason)
+    }
+
+    fn draw_panel<B: DrawingBackend>(
+        &self,
+        panel: &Panel,
+        area: &DrawingArea<B, Shift>,
+        last: bool,
+        scale: i32,
+    ) -> Result<(), String> {
+        let time = series::time_range(&self.times);
+        let time_ticks = series::ticks(&time, 8);
+        let (range, ticks, prefix, factor) = match &panel.axis {
+            Axis::Linear(range) => {
+                let (prefix, factor) = series::prefix(range.start.abs().max(range.end.abs()));
+                let range = range.start * factor..range.end * factor;
+                let ticks = series::ticks(&range, 5);
+                (range, ticks, prefix, factor)
+            }
+            Axis::Decades(range) => {
+                let ticks = series::ticks(range, 5).into_iter().filter(|tick| tick.fract() == 0.0).collect();
+                (range.start - 0.1..range.end + 0.1, ticks, "", 1.0)
+            }
+        };
+        let mut chart = ChartBuilder::on(area)
+            .margin_top(7 * scale)
+            .margin_bottom(if last { 2 * scale } else { 7 * scale })
+            .margin_right(10 * scale)
+            .set_label_area_size(plotters::prelude::LabelAreaPosition::Left, VALUE_LABELS_WIDTH * scale)
+            .set_label_area_size(
+                plotters::prelude::LabelAreaPosition::Bottom,
+                if last { (TIME_LABELS_HEIGHT - 2) * scale } else { 0 },
+            )
+            .build_cartesian_2d(
+                time.clone().with_key_points(time_ticks.clone()),
+                range.clone().with_key_points(ticks.clone()),
+            )
+            .map_err(reason)?;
+        let decades = matches!(panel.axis, Axis::Decades(_));
+        let value_label = |tick: &f64| match decades {
+            true => series::power_label(*tick),
+            false => series::label(*tick, &ticks),
+        };
+        chart
+            .configure_mesh()
+            .bold_line_style(ink(GRID, scale as u32))
+            .light_line_style(ink(GRID, 0))
+            .max_light_lines(0)
+            .axis_style(ink(FAINT_INK, scale as u32))
+            .label_style(letters(LABEL_SIZE, scale, INK))
+            .axis_desc_style(letters(LABEL_SIZE, scale, INK))
+            .x_label_formatter(&|tick| series::label(*tick, &time_ticks))
+            .y_label_formatter(&value_label)
+            .x_desc(if last { "time, s" } else { "" })
+            .y_desc(format!("{}, {prefix}{}", panel.quantity, panel.unit))
+            .draw()
+            .map_err(reason)?;
+        if !decades {
+            let zero = PathElement::new([(time.start, 0.0), (time.end, 0.0)], ink(FAINT_INK, scale as u32));
+            chart.draw_series([zero]).map_err(reason)?;
+        }
+        // Columns of the bitmap as it is shown: finer ones can't be told apart.
+        let columns = (WIDTH - LEGEND_WIDTH - VALUE_LABELS_WIDTH) as usize;
+        for line in &panel.lines {
+            let values: Vec<f64> = match decades {
+                // Zero has no logarithm; it sits on the lower edge with all that is too small.
+                true => line.values.iter().map(|v| v.max(0.0).log10().max(range.start) + 0.0 * v).collect(),
+                false => line.values.iter().map(|v| v * factor).collect(),
+            };
+            for points in series::thinned(&self.times, &values, columns) {
+                draw_line(&mut chart, points, line, scale)?;
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Draws one unbroken stretch of a signal.
+fn draw_line<B, X, Y>(
+    chart: &mut ChartContext<'_, B, Cartesian2d<X, Y>>,
+    points: Vec<(f64, f64)>,
+    line: &Line,
+    scale: i32,
+) -> Result<(), String>
+where
+    B: DrawingBackend,
+    X: Ranged<ValueType = f64>,
+    Y: Ranged<ValueType = f64>,
+{
+    let style = pen(line.colour, scale);
+    let drawn = match (line.dash, points.as_slice()) {
+        (_, [single]) => {
+            chart.draw_series([Circle::new(*single, 2 * scale, style.filled())]).map(|_| ())
+        }
+        (Dash::Solid, _) => chart.draw_series(LineSeries::new(points, style)).map(|_| ()),
+        (Dash::Broken(on, off), _) => {
+            chart.draw_series(DashedLineSeries::new(points, on * scale, off * scale, style)).map(|_| ())
+        }
+    };
+    drawn.map_err(reason)
+}
+
+fn draw_legend<B: DrawingBackend>(
+    panel: &Panel,
+    area: &DrawingArea<B, Shift>,
+    scale: i32,
+) -> Result<(), String> {
+    let words = |colour| letters(LABEL_SIZE, scale, colour).pos(Pos::new(HPos::Left, VPos::Center));
+    let mut y = 15;
+    if !panel.heading.is_empty() {
+        let at = (4 * scale, y * scale);
+        area.draw(&Text::new(shortened(&panel.heading, 22), at, words(INK))).map_err(reason)?;
+        y += LEGEND_PITCH;
+    }
+    for line in &panel.lines {
+        let sample = [(4 * scale, y * scale), (36 * scale, y * scale)];
+        let style = pen(line.colour, scale);
+        match line.dash {
+            Dash::Solid => area.draw(&PathElement::new(sample, style)),
+            Dash::Broken(on, off) => area.draw(&plotters::element::DashedPathElement::new(
+                sample,
+                on * scale,
+                off * scale,
+                style,
+            )),
+        }
+        .map_err(reason)?;
+        let at = (43 * scale, y * scale);
+        area.draw(&Text::new(shortened(&line.name, 17), at, words(INK))).map_err(reason)?;
+        y += LEGEND_PITCH;
+    }
+    Ok(())
+}
+
+fn reason(error: impl Display) -> String {
+    error.to_string()
+}
+
+fn ink(colour: Rgb, width: u32) -> ShapeStyle {
+    ShapeStyle { color: RGBColor(colour[0], colour[1], colour[2]).into(), filled: false, stroke_width: width }
+}
+
+fn pen(colour: Rgb, scale: i32) -> ShapeStyle {
+    ink(colour, (LINE_WIDTH * f64::from(scale)).round() as u32)
+}
+
+fn letters(size: i32, scale: i32, colour: Rgb) -> TextStyle<'static> {
+    TextStyle::from(("sans-serif", size * scale).into_font().transform(FontTransform::None))
+        .color(&RGBColor(colour[0], colour[1], colour[2]))
+}
+
+/// At most `length` letters, the last one an ellipsis where some are missing.
+fn shortened(words: &str, length: usize) -> String {
+    if words.chars().count() <= length {
+        return words.to_owned();
+    }
+    words.chars().take(length.saturating_sub(1)).chain(['…']).collect()
+}

@@ -1,0 +1,109 @@
+//! Figures of a run: plots, pictures of the grasp, and a short animation.
+//!
+//! [`write`] leaves these files in a directory; the same run gives the same bytes.
+//!
+//! | file | shows |
+//! |---|---|
+//! | `joint-velocities.{png,svg}` | velocity of every joint, a panel for each finger |
+//! | `object-velocities.{png,svg}` | velocity and angular velocity of the object |
+//! | `contact-forces.{png,svg}` | normal force, the desired one of Eq. 57, tangential force, a panel for each finger |
+//! | `residuals.{png,svg}` | lengths of the residuals `Delta lambda` of Eq. 38, over a logarithmic axis |
+//! | `grasp-start.png`, `grasp-end.png` | hand, object and contact forces in three dimensions (bitmaps only) |
+//! | `grasp.gif` | the run, in about six seconds |
+//!
+//! [`plots`] says what the plots show, [`chart`] draws them with Plotters; [`scene3d`] turns hand and object into
+//! triangles, [`camera`] chooses where to look from, [`raster`] draws them, [`picture`] and [`animation`] add the words.
+//! [`canvas`] and [`text`] are the bitmap under all of it.
+
+mod animation;
+mod camera;
+mod canvas;
+mod chart;
+mod mesh;
+mod palette;
+mod picture;
+mod plots;
+mod quantise;
+mod raster;
+mod scene3d;
+mod series;
+#[cfg(test)]
+mod tests;
+mod text;
+
+use crate::Hand;
+use crate::plant::polyhedron::Polyhedron;
+use crate::sim::trace::Sample;
+use std::path::{Path, PathBuf};
+use std::{fs, io};
+
+/// What a report is made from.
+#[derive(Clone, Copy, Debug)]
+pub struct Report<'a> {
+    /// Over every figure: the scene's name.
+    pub title: &'a str,
+    /// The hand.
+    pub hand: &'a Hand,
+    /// Names of its joints, in their order.
+    pub joint_names: &'a [String],
+    /// The object.
+    pub object: &'a Polyhedron,
+    /// The run, in the order of time.
+    pub samples: &'a [Sample],
+}
+
+/// Why a report could not be written.
+#[derive(Debug, thiserror::Error)]
+pub enum ReportError {
+    /// The directory is missing and can't be made.
+    #[error("cannot create the directory {}: {source}", path.display())]
+    Directory {
+        /// The directory.
+        path: PathBuf,
+        /// What the system said.
+        source: io::Error,
+    },
+    /// A file can't be written.
+    #[error("cannot write {}: {source}", path.display())]
+    Write {
+        /// The file.
+        path: PathBuf,
+        /// What the system said.
+        source: io::Error,
+    },
+    /// A figure can't be drawn.
+    #[error("cannot draw {}: {reason}", path.display())]
+    Draw {
+        /// The file that it was for.
+        path: PathBuf,
+        /// What the drawing library said.
+        reason: String,
+    },
+}
+
+/// Draws every figure of a run and writes it to `dir`, which is created if need be. Files of the same names are
+/// replaced.
+///
+/// A run without samples gives empty plots and a picture of the hand with all joints at zero.
+///
+/// # Errors
+/// The first file that could not be drawn or written; those before it are there.
+pub fn write(dir: &Path, report: &Report<'_>) -> Result<(), ReportError> {
+    fs::create_dir_all(dir).map_err(|source| ReportError::Directory { path: dir.to_owned(), source })?;
+    let save = |name: String, drawn: Result<Vec<u8>, String>| {
+        let path = dir.join(name);
+        match drawn {
+            Ok(bytes) => fs::write(&path, bytes).map_err(|source| ReportError::Write { path, source }),
+            Err(reason) => Err(ReportError::Draw { path, reason }),
+        }
+    };
+    for plot in plots::all(report.title, report.hand, report.joint_names, report.samples) {
+        save(format!("{}.png", plot.name), plot.figure.png())?;
+        save(format!("{}.svg", plot.name), plot.figure.svg())?;
+    }
+    let stage = scene3d::Stage::new(report);
+    for moment in [picture::Moment::Start, picture::Moment::End] {
+        save(format!("{}.png", moment.file_name()), picture::draw(report, &stage, moment).png().map_err(|e| e.to_string()))?;
+    }
+    save("grasp.gif".to_owned(), animation::draw(report, &stage))
+}

@@ -1,0 +1,447 @@
+//! What may stand in the files: scenes, hands, objects. Every key carries its unit; nothing else is allowed.
+//!
+//! These structs are the effective configuration: what stays after references are followed, defaults filled in and
+//! `--set` applied. Tests build them in code and hand them to [`Scene::build`](super::Scene::build).
+
+use serde::{Deserialize, Deserializer, Serialize, Serializer, de};
+use std::collections::BTreeMap;
+
+/// The version of the format that this program reads and writes.
+pub const SCHEMA: u32 = 1;
+
+/// A scene: a hand, an object, where they meet, and everything that a run depends on.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SceneFile {
+    /// Version of the format; [`SCHEMA`].
+    pub schema: u32,
+    /// A word.
+    pub name: String,
+    /// A sentence or two.
+    #[serde(default)]
+    pub description: String,
+    /// Length of the run, s.
+    pub duration_s: f64,
+    /// Seed of the noise; does nothing while there is none.
+    #[serde(default)]
+    pub seed: u32,
+    /// The hand. In a file also a built-in name, or a path relative to that file.
+    pub hand: HandFile,
+    /// The object. In a file also a built-in name, or a path relative to that file.
+    pub object: ObjectFile,
+    /// Where the object is at the start.
+    pub pose: PoseFile,
+    /// Where the fingertips touch it: one for each fingertip, in the hand's order.
+    #[serde(rename = "contact")]
+    pub contacts: Vec<ContactFile>,
+    /// How the run begins.
+    #[serde(default)]
+    pub start: StartFile,
+    /// The controller.
+    pub control: Control,
+    /// The joint sensors.
+    #[serde(default)]
+    pub sensors: Sensors,
+    /// The motors and their amplifiers.
+    #[serde(default)]
+    pub actuators: Actuators,
+    /// The friction of the joints.
+    #[serde(default)]
+    pub friction: Friction,
+    /// The simulated world.
+    #[serde(default)]
+    pub plant: PlantSettings,
+}
+
+/// A position and an attitude in the base frame of the hand.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct PoseFile {
+    /// Of the object's centre of mass, m.
+    pub position_m: [f64; 3],
+    /// Roll, pitch and yaw about fixed x, y and z axes, in this order, rad.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub rotation_rpy_rad: Option<[f64; 3]>,
+    /// Instead of the angles: the unit quaternion w, x, y, z.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub quaternion_wxyz: Option<[f64; 4]>,
+}
+
+/// Where a fingertip touches the object. The object frame has the axes of the shape's description and its origin at the
+/// object's centre of mass.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ContactFile {
+    /// Index of the face, from 0; without it the face is the one that the point lies on.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub face: Option<usize>,
+    /// A point of the face in the object frame, m. Needed unless `start.angles_rad` places the fingers.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub point_m: Option<[f64; 3]>,
+}
+
+/// How the run begins, at rest.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct StartFile {
+    /// How deep the fingertips are indented.
+    #[serde(default)]
+    pub indentation_m: Indentation,
+    /// Angles of joints that move several fingertips, by name; the others of these stay at their nominal angles.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub trunk_rad: BTreeMap<String, f64>,
+    /// Angles of all joints, rad. They replace the inverse kinematics: contact points and indentations follow.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub angles_rad: Option<Vec<f64>>,
+}
+
+impl Default for StartFile {
+    fn default() -> Self {
+        Self { indentation_m: Indentation::default(), trunk_rad: BTreeMap::new(), angles_rad: None }
+    }
+}
+
+/// Indentation `dr_i` at the start.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Indentation {
+    /// The same for every fingertip, m.
+    Metres(f64),
+    /// The one of Eq. 57, at which the normal forces are those that the grasp settles at. In files: `"equilibrium"`.
+    Equilibrium,
+}
+
+impl Default for Indentation {
+    /// The fingers just touch.
+    fn default() -> Self {
+        Self::Metres(1e-4)
+    }
+}
+
+impl Serialize for Indentation {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        match self {
+            Self::Metres(m) => serializer.serialize_f64(*m),
+            Self::Equilibrium => serializer.serialize_str("equilibrium"),
+        }
+    }
+}
+
+impl<'de> Deserialize<'de> for Indentation {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct Visitor;
+        impl de::Visitor<'_> for Visitor {
+            type Value = Indentation;
+            fn expecting(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+                write!(f, "a length in metres, or \"equilibrium\"")
+            }
+            fn visit_f64<E: de::Error>(self, v: f64) -> Result<Indentation, E> {
+                Ok(Indentation::Metres(v))
+            }
+            fn visit_i64<E: de::Error>(self, v: i64) -> Result<Indentation, E> {
+                Ok(Indentation::Metres(v as f64))
+            }
+            fn visit_str<E: de::Error>(self, v: &str) -> Result<Indentation, E> {
+                match v {
+                    "equilibrium" => Ok(Indentation::Equilibrium),
+                    _ => Err(E::invalid_value(de::Unexpected::Str(v), &self)),
+                }
+            }
+        }
+        deserializer.deserialize_any(Visitor)
+    }
+}
+
+/// The controller: Eqs. 29-34 and what surrounds them. The damping gains are the hand's.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Control {
+    /// Nominal grasping force `f_d` of Eq. 30, N. The fingertips' force follows from it by Eq. 57.
+    pub force_n: f64,
+    /// Stiffness `K_st` of the relative attitude constraint of Eq. 32, N m; 0 for the normal forces alone.
+    pub attitude_stiffness_nm: f64,
+    /// Factor on the damping gains of the hand's joints.
+    #[serde(default = "one")]
+    pub damping_scale: f64,
+    /// Whether the term `g` of Eq. 30 holds the weight of the links.
+    #[serde(default = "yes")]
+    pub gravity_compensation: bool,
+    /// Sampling period, s.
+    #[serde(default = "Control::period_s")]
+    pub period_s: f64,
+    /// Time over which `f_d` rises from zero, s.
+    #[serde(default)]
+    pub soft_start_s: f64,
+    /// Bandwidth of the estimate of joint angles and speeds from the encoder counts, Hz. Ideal sensors need no estimate.
+    #[serde(default = "Control::estimator_bandwidth_hz")]
+    pub estimator_bandwidth_hz: f64,
+    /// Whether soft end stops keep the joints within their limits.
+    #[serde(default = "yes")]
+    pub end_stops: bool,
+}
+
+impl Control {
+    fn period_s() -> f64 {
+        1e-3
+    }
+
+    fn estimator_bandwidth_hz() -> f64 {
+        50.0
+    }
+}
+
+/// The joint sensors.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Sensors {
+    /// The controller sees true angles and speeds instead of encoder counts.
+    #[serde(default)]
+    pub ideal: bool,
+    /// Standard deviation of the noise on the counts, counts.
+    #[serde(default)]
+    pub noise_counts: f64,
+}
+
+/// The motors and their amplifiers.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Actuators {
+    /// Control periods between reading the encoders and applying the torques: 0 or 1.
+    #[serde(default = "Actuators::output_delay_ticks")]
+    pub output_delay_ticks: u32,
+    /// Whether the torque limits of the hand's joints apply.
+    #[serde(default = "yes")]
+    pub torque_limits: bool,
+    /// The fastest that a torque may change, N m/s; without it, at once.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub slew_limit_nm_s: Option<f64>,
+}
+
+impl Actuators {
+    fn output_delay_ticks() -> u32 {
+        1
+    }
+}
+
+impl Default for Actuators {
+    fn default() -> Self {
+        Self { output_delay_ticks: 1, torque_limits: true, slew_limit_nm_s: None }
+    }
+}
+
+/// The friction of the joints.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Friction {
+    /// Factor on the friction of the hand's joints; 0 for the paper's model, which has none.
+    #[serde(default = "one")]
+    pub scale: f64,
+}
+
+impl Default for Friction {
+    fn default() -> Self {
+        Self { scale: 1.0 }
+    }
+}
+
+/// The simulated world.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct PlantSettings {
+    /// Step of the integrator, s; divides the sampling period.
+    #[serde(default = "PlantSettings::substep_s")]
+    pub substep_s: f64,
+    /// Gravity on the hand in its base frame, m/s^2.
+    #[serde(default = "PlantSettings::gravity_m_s2")]
+    pub gravity_m_s2: [f64; 3],
+    /// Whether the object has weight too. The paper neglects it (assumption 5).
+    #[serde(default)]
+    pub gravity_on_object: bool,
+}
+
+impl PlantSettings {
+    fn substep_s() -> f64 {
+        1e-4
+    }
+
+    fn gravity_m_s2() -> [f64; 3] {
+        [0.0, 0.0, -9.81]
+    }
+}
+
+impl Default for PlantSettings {
+    fn default() -> Self {
+        Self { substep_s: Self::substep_s(), gravity_m_s2: Self::gravity_m_s2(), gravity_on_object: false }
+    }
+}
+
+/// A hand.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct HandFile {
+    /// Version of the format; [`SCHEMA`].
+    pub schema: u32,
+    /// A word.
+    pub name: String,
+    /// A sentence or two.
+    #[serde(default)]
+    pub description: String,
+    /// The joints, each after its parent. In a file, keys of `[joint_defaults]` stand for those that a joint leaves out.
+    #[serde(rename = "joint")]
+    pub joints: Vec<JointFile>,
+    /// The fingertips. In a file, keys of `[fingertip_defaults]` stand for those that a fingertip leaves out.
+    #[serde(rename = "fingertip")]
+    pub fingertips: Vec<FingertipFile>,
+}
+
+/// A revolute joint, the link that it carries, and its motor.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct JointFile {
+    /// Its name, which is also its link's.
+    pub name: String,
+    /// Name of the joint on whose link it sits; without it, the base.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub parent: Option<String>,
+    /// Where it sits in the parent's link frame, m.
+    #[serde(default)]
+    pub offset_m: [f64; 3],
+    /// Attitude of its link frame at zero angle in the parent's link frame: roll, pitch and yaw about fixed x, y and z
+    /// axes, in this order, rad.
+    #[serde(default)]
+    pub rotation_rpy_rad: [f64; 3],
+    /// Its axis in its link frame, a unit vector.
+    pub axis: [f64; 3],
+    /// Lower and upper end stop, rad.
+    pub limits_rad: [f64; 2],
+    /// Angle that the inverse kinematics starts from and stays close to, rad.
+    #[serde(default)]
+    pub nominal_rad: f64,
+    /// Mass of the link, kg; 0 for a link that is counted in another.
+    #[serde(default)]
+    pub mass_kg: f64,
+    /// Centre of mass in the link frame, m.
+    #[serde(default)]
+    pub mass_centre_m: [f64; 3],
+    /// Inertia about the centre of mass in the axes of the link frame, kg m^2: xx, yy, zz, and xy, xz, yz unless zero.
+    #[serde(default)]
+    pub inertia_kg_m2: InertiaFile,
+    /// Gain `C` of Eq. 30, N m s/rad.
+    pub damping_gain_nm_s_rad: f64,
+    /// The largest torque at the joint, N m.
+    pub torque_limit_nm: f64,
+    /// The largest speed at the joint, rad/s.
+    pub speed_limit_rad_s: f64,
+    /// Encoder counts in one turn of the joint, all edges counted.
+    pub encoder_counts_per_turn: f64,
+    /// Viscous friction at the joint, N m s/rad.
+    #[serde(default)]
+    pub viscous_friction_nm_s_rad: f64,
+    /// Coulomb friction at the joint, N m.
+    #[serde(default)]
+    pub coulomb_friction_nm: f64,
+    /// How far the joint gives before its Coulomb friction lets it slide, rad.
+    #[serde(default = "JointFile::presliding_rad")]
+    pub presliding_rad: f64,
+}
+
+impl JointFile {
+    fn presliding_rad() -> f64 {
+        1e-3
+    }
+}
+
+/// A symmetric tensor in a file: `[xx, yy, zz]` or `[xx, yy, zz, xy, xz, yz]`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(transparent)]
+pub struct InertiaFile(pub Vec<f64>);
+
+impl Default for InertiaFile {
+    fn default() -> Self {
+        Self(vec![0.0; 3])
+    }
+}
+
+/// A soft hemispherical fingertip. Its contact area is `pi (2 r dr - dr^2)`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct FingertipFile {
+    /// Its name.
+    pub name: String,
+    /// Name of the joint whose link it is part of.
+    pub link: String,
+    /// Centre of its sphere in the link frame, m.
+    pub offset_m: [f64; 3],
+    /// Radius `r_i`, m.
+    pub radius_m: f64,
+    /// Stiffness `k_i` of Eq. 14, N/m^2.
+    pub stiffness_n_m2: f64,
+    /// Damping `xi_i` of Eq. 14 for each square metre of contact area, (N s/m)/m^2.
+    pub damping_n_s_m_per_m2: f64,
+    /// Torsional damping `b_i` of Eq. 15 for each square metre of contact area, (N m s/rad)/m^2.
+    pub torsional_damping_nm_s_rad_per_m2: f64,
+}
+
+/// An object.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ObjectFile {
+    /// Version of the format; [`SCHEMA`].
+    pub schema: u32,
+    /// A word.
+    pub name: String,
+    /// A sentence or two.
+    #[serde(default)]
+    pub description: String,
+    /// Mass, kg.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub mass_kg: Option<f64>,
+    /// Instead of the mass: density, kg/m^3.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub density_kg_m3: Option<f64>,
+    /// Inertia about the centre of mass in the object frame, kg m^2; without it, that of a uniform body.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub inertia_kg_m2: Option<InertiaFile>,
+    /// What it looks like.
+    pub shape: ShapeFile,
+}
+
+/// A convex polyhedron. Wherever its description puts the origin, the object frame has its origin at the centre of mass.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
+pub enum ShapeFile {
+    /// A box with its sides along the axes. Faces: -x, +x, -y, +y, -z, +z.
+    Box {
+        /// Side lengths along x, y and z, m.
+        size_m: [f64; 3],
+    },
+    /// A right prism over a regular polygon, its axis along z. Faces: the sides, beginning with the one that looks along -y
+    /// and going counter-clockwise seen from +z; then bottom (-z) and top (+z).
+    Prism {
+        /// Number of sides.
+        sides: u32,
+        /// Length of a side, m.
+        side_m: f64,
+        /// Extent along z, m.
+        height_m: f64,
+    },
+    /// A right prism over a convex polygon, its axis along z. Faces: the sides from each corner to the next, bottom, top.
+    PolygonPrism {
+        /// Corners x, y, m, counter-clockwise seen from +z.
+        corners_m: Vec<[f64; 2]>,
+        /// Extent along z, m.
+        height_m: f64,
+    },
+    /// The convex hull of points.
+    Hull {
+        /// The points, m.
+        points_m: Vec<[f64; 3]>,
+    },
+}
+
+fn one() -> f64 {
+    1.0
+}
+
+fn yes() -> bool {
+    true
+}

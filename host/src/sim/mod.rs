@@ -1,0 +1,3 @@
+//! The closed loop.
+
+pub mod trace;

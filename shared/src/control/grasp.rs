@@ -1,0 +1,260 @@
+//! The grasp law `u = u_s + u_st` (Eqs. 29-34, with the desired attitudes of Eq. 59).
+//!
+//! - `u_s` (Eq. 30) draws the fingertip centres together: each is pulled towards their **centroid** like by a spring,
+//!   the joints are damped, and the weight of the links is held. It presses the fingertips against whatever is
+//!   between them.
+//! - `u_st` (Eq. 32) holds the fingertips' **relative attitudes** as they were when the grasp began (the **latch**).
+//!   A fingertip can't roll on a face without turning against its neighbours, so this supplies the tangential forces
+//!   that the normal forces of `u_s` lack.
+//!
+//! Neither knows the object. Each is the negative gradient of a potential (Eqs. 43 and 44), and the forces and moments
+//! that each puts on the fingertips sum to zero, so that a trunk feels neither.
+//!
+//! How it is computed, and where that departs from the print:
+//! - With `D_i = R_fi R_fi,ini^T`, the turn of fingertip `i` since the latch, the sum of three cross products in Eq. 32
+//!   is the axial vector of `D_i D_j^T`. The law needs no fingertip frame of its own, only how it turns.
+//! - The fingertips are a ring: the neighbours `i - 1` and `i + 1` of the print are taken modulo `N`. Each pair of
+//!   neighbours is computed once, since what it does to one fingertip it does to the other with the opposite sign.
+//!   Two fingertips are neighbours twice, as the print's sum has it.
+//! - `V_st` has the constant `3 N K_st` added, so that it is zero at the latch and never negative: the energy is then
+//!   bounded for every `K_st`, and the condition of Eq. 49 is a sizing rule only.
+
+use crate::hand::{Hand, Posture, Wrench};
+use crate::math::Real;
+use core::fmt;
+use nalgebra::{Matrix3, Vector3};
+
+/// Gains of the grasp law, as a user gives them.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct GraspConfig<T, const J: usize> {
+    /// Nominal grasping force `f_d`, N. The force of a fingertip is not this but Eq. 57, and grows with the object's
+    /// size.
+    pub force_n: T,
+    /// Stiffness `K_st` of the relative attitudes, N m; zero grasps by normal forces alone.
+    pub attitude_stiffness_nm: T,
+    /// Damping `C` of each joint, N m s/rad.
+    pub damping_nm_s: [T; J],
+    /// Gravity in the base frame, m/s^2; `None` leaves the weight of the links uncompensated.
+    pub gravity_m_s2: Option<Vector3<T>>,
+}
+
+/// Why gains can't be used.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct ControlError {
+    /// The parameter.
+    pub parameter: &'static str,
+    /// The joint that it belongs to, if it belongs to one.
+    pub joint: Option<usize>,
+    /// What it has to be.
+    pub reason: &'static str,
+}
+
+impl fmt::Display for ControlError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.joint {
+            Some(joint) => write!(f, "{} of joint {joint} {}", self.parameter, self.reason),
+            None => write!(f, "{} {}", self.parameter, self.reason),
+        }
+    }
+}
+
+impl core::error::Error for ControlError {}
+
+impl<T: Real, const J: usize> GraspConfig<T, J> {
+    /// Checks the gains and prepares the law for a hand.
+    ///
+    /// # Errors
+    /// The first gain that is not finite or negative.
+    pub fn prepare<const F: usize>(&self, hand: &Hand<T, J, F>) -> Result<GraspLaw<T, J>, ControlError> {
+        let fail = |parameter, joint, reason| Err(ControlError { parameter, joint, reason });
+        let positive_or_zero = |v: T| v >= T::zero() && v.is_finite();
+        if !positive_or_zero(self.force_n) {
+            return fail("force_n", None, "has to be zero or positive");
+        }
+        if !positive_or_zero(self.attitude_stiffness_nm) {
+            return fail("attitude_stiffness_nm", None, "has to be zero or positive");
+        }
+        let damping = &self.damping_nm_s[..hand.joint_count()];
+        if let Some(joint) = damping.iter().position(|&c| !positive_or_zero(c)) {
+            return fail("damping_nm_s", Some(joint), "has to be zero or positive");
+        }
+        if self.gravity_m_s2.is_some_and(|g| !g.iter().all(|v| v.is_finite())) {
+            return fail("gravity_m_s2", None, "has to be finite");
+        }
+        let radii = (0..hand.fingertip_count()).fold(T::zero(), |sum, i| sum + hand.radius_m(i));
+        Ok(GraspLaw {
+            approach_stiffness_n_m: self.force_n / radii,
+            attitude_stiffness_nm: self.attitude_stiffness_nm,
+            damping_nm_s: self.damping_nm_s,
+            gravity_m_s2: self.gravity_m_s2,
+            share_of_one: T::one() / T::from_i32(hand.fingertip_count() as i32),
+        })
+    }
+}
+
+/// The fingertips' attitudes `R_fi,ini` when the grasp began (Eq. 59).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Latch<T, const F: usize> {
+    attitudes: [Matrix3<T>; F],
+}
+
+impl<T: Real, const F: usize> Latch<T, F> {
+    /// Keeps the attitudes of a posture.
+    pub fn of<const J: usize>(posture: &Posture<T, J, F>) -> Self {
+        Self { attitudes: posture.attitudes }
+    }
+}
+
+/// How firmly the law grasps in this tick.
+#[derive(Clone, Copy, Debug)]
+pub struct Grip<'a, T, const F: usize> {
+    /// Attitudes to hold.
+    pub latch: &'a Latch<T, F>,
+    /// Share of `f_d`, from 0 to 1: the soft start, so that the fingers do not hammer the object.
+    pub force_share: T,
+    /// Share of `K_st`, from 0 to 1.
+    pub attitude_share: T,
+}
+
+/// What the law knows about itself without seeing the object.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Monitor<T> {
+    /// Potential `V_s` of the approach (Eq. 43), J.
+    pub approach_potential_j: T,
+    /// Potential `V_st` of the relative attitudes (Eq. 44) above its least value, J.
+    pub attitude_potential_j: T,
+}
+
+/// The grasp law, prepared for one hand.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct GraspLaw<T, const J: usize> {
+    /// `A = f_d / sum(r_i)` (Eq. 38), N/m.
+    approach_stiffness_n_m: T,
+    /// `K_st`, N m.
+    attitude_stiffness_nm: T,
+    /// `C`, N m s/rad.
+    damping_nm_s: [T; J],
+    gravity_m_s2: Option<Vector3<T>>,
+    /// `1 / N`.
+    share_of_one: T,
+}
+
+impl<T: Real, const J: usize> GraspLaw<T, J> {
+    /// `A = f_d / sum(r_i)` (Eq. 38), N/m.
+    pub fn approach_stiffness_n_m(&self) -> T {
+        self.approach_stiffness_n_m
+    }
+
+    /// `K_st`, N m.
+    pub fn attitude_stiffness_nm(&self) -> T {
+        self.attitude_stiffness_nm
+    }
+
+    /// Joint torques `u` (Eq. 29), N m, and what the law knows of itself. Without a grip the joints are only damped
+    /// and their weight held.
+    pub fn torques<const F: usize>(
+        &self,
+        hand: &Hand<T, J, F>,
+        posture: &Posture<T, J, F>,
+        speeds_rad_s: &[T; J],
+        grip: Option<Grip<'_, T, F>>,
+    ) -> ([T; J], Monitor<T>) {
+        let mut wrenches = [Wrench::zero(); F];
+        let mut monitor = Monitor { approach_potential_j: T::zero(), attitude_potential_j: T::zero() };
+        if let Some(grip) = grip {
+            let stiffness = self.approach_stiffness_n_m * grip.force_share;
+            monitor.approach_potential_j = self.approach(hand, posture, stiffness, &mut wrenches);
+            let stiffness = self.attitude_stiffness_nm * grip.attitude_share;
+            if stiffness > T::zero() {
+                monitor.attitude_potential_j =
+                    hold_attitudes(hand, posture, grip.latch, stiffness, &mut wrenches);
+            }
+        }
+        let mut torques = hand.joint_torques(posture, &wrenches, self.gravity_m_s2.as_ref());
+        for ((torque, speed), damping) in torques.iter_mut().zip(speeds_rad_s).zip(&self.damping_nm_s) {
+            *torque -= *damping * *speed;
+        }
+        (torques, monitor)
+    }
+
+    /// The wrenches of `u_s` at full force, as if the law knew the fingertips' centres only: `A (x_c - x_i)` (Eq. 30).
+    pub fn approach_wrenches<const F: usize>(
+        &self,
+        hand: &Hand<T, J, F>,
+        posture: &Posture<T, J, F>,
+    ) -> [Wrench<T>; F] {
+        let mut wrenches = [Wrench::zero(); F];
+        self.approach(hand, posture, self.approach_stiffness_n_m, &mut wrenches);
+        wrenches
+    }
+
+    /// The wrenches of `u_st` at full stiffness: `K_st B_sti` (Eq. 38).
+    pub fn attitude_wrenches<const F: usize>(
+        &self,
+        hand: &Hand<T, J, F>,
+        posture: &Posture<T, J, F>,
+        latch: &Latch<T, F>,
+    ) -> [Wrench<T>; F] {
+        let mut wrenches = [Wrench::zero(); F];
+        hold_attitudes(hand, posture, latch, self.attitude_stiffness_nm, &mut wrenches);
+        wrenches
+    }
+
+    /// Adds the pull of each fingertip centre towards the centroid (Eqs. 30, 31) and returns its potential (Eq. 43),
+    /// which is `A / 2` times the sum of the squared distances from the centroid.
+    fn approach<const F: usize>(
+        &self,
+        hand: &Hand<T, J, F>,
+        posture: &Posture<T, J, F>,
+        stiffness_n_m: T,
+        wrenches: &mut [Wrench<T>; F],
+    ) -> T {
+        let centres = || posture.centres_m.iter().take(hand.fingertip_count());
+        let centroid = centres().fold(Vector3::zeros(), |sum, centre| sum + centre) * self.share_of_one;
+        let mut squares = T::zero();
+        for (wrench, centre) in wrenches.iter_mut().zip(centres()) {
+            let away = centroid - centre;
+            squares += away.dot(&away);
+            wrench.force_n += away * stiffness_n_m;
+        }
+        squares * stiffness_n_m * T::from_f64(0.5)
+    }
+}
+
+/// Adds the moments that hold the relative attitudes (Eq. 32) and returns their potential (Eq. 44, above its least
+/// value).
+fn hold_attitudes<T: Real, const J: usize, const F: usize>(
+    hand: &Hand<T, J, F>,
+    posture: &Posture<T, J, F>,
+    latch: &Latch<T, F>,
+    stiffness_nm: T,
+    wrenches: &mut [Wrench<T>; F],
+) -> T {
+    let count = hand.fingertip_count().min(F);
+    let mut turns = [Matrix3::identity(); F];
+    for (turn, (now, then)) in
+        turns.iter_mut().zip(posture.attitudes.iter().zip(&latch.attitudes)).take(count)
+    {
+        *turn = now * then.transpose();
+    }
+    let mut missing_traces = T::zero();
+    for i in 0..count {
+        let next = if i + 1 == count { 0 } else { i + 1 };
+        let (axial, trace) = axial_and_trace(&turns[i], &turns[next]);
+        missing_traces += T::from_i32(3) - trace;
+        let moment = axial * stiffness_nm;
+        wrenches[i].moment_nm += moment;
+        wrenches[next].moment_nm -= moment;
+    }
+    missing_traces * stiffness_nm
+}
+
+/// Axial vector and trace of `a b^T`: the sum of the cross products of the columns of `a` with those of `b`, and the
+/// sum of their dot products. Only the entries that these need are formed.
+fn axial_and_trace<T: Real>(a: &Matrix3<T>, b: &Matrix3<T>) -> (Vector3<T>, T) {
+    let entry = |row: usize, column: usize| {
+        a[(row, 0)] * b[(column, 0)] + a[(row, 1)] * b[(column, 1)] + a[(row, 2)] * b[(column, 2)]
+    };
+    let axial = Vector3::new(entry(1, 2) - entry(2, 1), entry(2, 0) - entry(0, 2), entry(0, 1) - entry(1, 0));
+    (axial, entry(0, 0) + entry(1, 1) + entry(2, 2))
+}
