@@ -12,5 +12,6 @@ pub type Hand = blindgrasp_shared::hand::Hand<f64, MAX_JOINTS, MAX_FINGERS>;
 pub type Posture = blindgrasp_shared::hand::Posture<f64, MAX_JOINTS, MAX_FINGERS>;
 
 pub mod plant;
+pub mod record;
 pub mod scene;
 pub mod sim;

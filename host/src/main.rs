@@ -1,1 +1,33 @@
-fn main() {}
+//! The command `blindgrasp`. Results go to stdout, progress and errors to stderr.
+
+mod commands;
+
+use clap::{Parser, Subcommand};
+use std::process::ExitCode;
+
+/// Blind grasping of polyhedral objects with a multi-fingered, torque-controlled hand
+#[derive(Parser)]
+#[command(name = "blindgrasp", version, arg_required_else_help = true)]
+struct Cli {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    Sim(commands::sim::Arguments),
+}
+
+fn main() -> ExitCode {
+    let outcome = match Cli::parse().command {
+        Command::Sim(arguments) => commands::sim::run(&arguments),
+    };
+    match outcome {
+        Ok(commands::Outcome::Shown) => ExitCode::SUCCESS,
+        Ok(commands::Outcome::Failed) => ExitCode::from(1),
+        Err(error) => {
+            eprintln!("blindgrasp: {error:#}");
+            ExitCode::from(2)
+        }
+    }
+}

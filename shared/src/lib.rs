@@ -12,6 +12,14 @@
 #[cfg(test)]
 extern crate std;
 
+pub mod command;
 pub mod control;
+pub mod estimate;
+pub mod fault;
 pub mod hand;
+pub mod limit;
 pub mod math;
+pub mod period;
+pub mod supervisor;
+pub mod telemetry;
+pub mod tick;

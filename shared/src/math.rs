@@ -189,6 +189,7 @@ mod tests {
     }
 
     #[test]
+    #[expect(clippy::disallowed_methods, reason = "compared with the standard library's")]
     fn square_root_is_correctly_rounded() {
         for x in [0.0_f32, 1.0, 2.0, 1e-30, 3.4e38, 0.1] {
             assert_eq!(x.square_root(), x.sqrt());

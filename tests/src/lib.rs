@@ -1,1 +1,14 @@
 //! Helpers that several of the tests use.
+//!
+//! - [`description`]: a hand in the user's frames, with forward kinematics written a second time, straight from the
+//!   description.
+//! - [`random`]: seeded random numbers, rotations, inertias and hands.
+//! - [`hands`]: the paper's three-fingered hand, and the same hand on an arm.
+//! - [`grasps`]: a hand, an object, a plant and the grasp law, ready to run.
+//! - [`numeric`]: derivatives by differences, and the largest of many errors.
+
+pub mod description;
+pub mod grasps;
+pub mod hands;
+pub mod numeric;
+pub mod random;

@@ -48,7 +48,7 @@ pub struct MassProperties {
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum PolyhedronError {
     /// A length that is not positive and finite.
-    #[error("{what} has to be positive and finite, not {value}")]
+    #[error("{what} has to be positive and finite, not {value:?}")]
     Length {
         /// What it is the length of.
         what: &'static str,

@@ -1,12 +1,6 @@
-//! A bitmap to draw on: anti-aliased strokes, text, averaging down, PNG. Plotters draws on it too.
+//! A bitmap to draw on: anti-aliased strokes, averaging down, PNG.
 
 use super::palette::{Rgb, WHITE};
-use super::text::{self, Anchor, Turn};
-use plotters_backend::text_anchor::{HPos, VPos};
-use plotters_backend::{
-    BackendColor, BackendCoord, BackendStyle, BackendTextStyle, DrawingBackend, DrawingErrorKind, FontTransform,
-};
-use std::convert::Infallible;
 
 /// A bitmap, eight bits a channel, rows from the top.
 #[derive(Clone, Debug, PartialEq)]
@@ -44,8 +38,7 @@ impl Canvas {
             let high = points.iter().map(of).fold(f32::NEG_INFINITY, f32::max) + reach;
             (low.floor().max(0.0) as usize, (high.ceil().max(-1.0) + 1.0).min(size as f32) as usize)
         };
-        let ((left, right), (top, bottom)) =
-            (bounds(|p| p.0, self.width), bounds(|p| p.1, self.height));
+        let ((left, right), (top, bottom)) = (bounds(|p| p.0, self.width), bounds(|p| p.1, self.height));
         if left >= right || top >= bottom {
             return;
         }
@@ -75,11 +68,14 @@ impl Canvas {
         }
     }
 
-    /// A filled rectangle; the right and bottom edges are excluded.
-    pub(super) fn fill(&mut self, x: (i32, i32), y: (i32, i32), colour: Rgb, alpha: f32) {
-        for row in y.0.max(0)..y.1.min(self.height as i32) {
-            for column in x.0.max(0)..x.1.min(self.width as i32) {
-                self.blend(column, row, colour, alpha);
+    /// A plain rectangle between two corners, the lower right one included, as far as it is on the canvas.
+    pub(super) fn fill(&mut self, from: (i32, i32), to: (i32, i32), colour: Rgb) {
+        let clamp = |v: i32, size: usize| usize::try_from(v).unwrap_or(0).min(size);
+        let (left, right) = (clamp(from.0, self.width), clamp(to.0.saturating_add(1), self.width));
+        let (top, bottom) = (clamp(from.1, self.height), clamp(to.1.saturating_add(1), self.height));
+        for row in self.pixels.chunks_exact_mut(self.width.max(1)).take(bottom).skip(top) {
+            if let Some(part) = row.get_mut(left..right) {
+                part.fill(colour);
             }
         }
     }
@@ -156,69 +152,5 @@ impl Segment {
         };
         let (ex, ey) = (dx - along * self.along.0, dy - along * self.along.1);
         ((self.none - (ex * ex + ey * ey)) / (self.none - self.full)).clamp(0.0, 1.0)
-    }
-}
-
-type Drawn = Result<(), DrawingErrorKind<Infallible>>;
-
-fn parts(colour: BackendColor) -> (Rgb, f32) {
-    ([colour.rgb.0, colour.rgb.1, colour.rgb.2], colour.alpha as f32)
-}
-
-/// What Plotters needs; the rest of its trait has default methods that end in `draw_pixel`.
-impl DrawingBackend for Canvas {
-    type ErrorType = Infallible;
-
-    fn get_size(&self) -> (u32, u32) {
-        (self.width as u32, self.height as u32)
-    }
-
-    fn ensure_prepared(&mut self) -> Drawn {
-        Ok(())
-    }
-
-    fn present(&mut self) -> Drawn {
-        Ok(())
-    }
-
-    fn draw_pixel(&mut self, (x, y): BackendCoord, colour: BackendColor) -> Drawn {
-        let (colour, alpha) = parts(colour);
-        self.blend(x, y, colour, alpha);
-        Ok(())
-    }
-
-    fn draw_line<S: BackendStyle>(&mut self, from: BackendCoord, to: BackendCoord, style: &S) -> Drawn {
-        self.draw_path([from, to], style)
-    }
-
-    fn draw_path<S: BackendStyle, I: IntoIterator<Item = BackendCoord>>(&mut self, path: I, style: &S) -> Drawn {
-        let points: Vec<(f32, f32)> = path.into_iter().map(|(x, y)| (x as f32, y as f32)).collect();
-        let (colour, alpha) = parts(style.color());
-        if !points.is_empty() && alpha > 0.0 {
-            self.stroke(&points, style.stroke_width() as f32, colour, alpha);
-        }
-        Ok(())
-    }
-
-    fn draw_text<S: BackendTextStyle>(&mut self, words: &str, style: &S, at: BackendCoord) -> Drawn {
-        let em = (style.size() / text::SIZE_PER_EM) as f32;
-        // The offsets of Plotters' SVG files, so that both kinds of file look alike.
-        let below = match style.anchor().v_pos {
-            VPos::Top => 0.76,
-            VPos::Center => 0.27,
-            VPos::Bottom => -0.27,
-        };
-        let anchor = match style.anchor().h_pos {
-            HPos::Left => Anchor::Left,
-            HPos::Center => Anchor::Centre,
-            HPos::Right => Anchor::Right,
-        };
-        let turn = match style.transform() {
-            FontTransform::Rotate270 => Turn::Up,
-            _ => Turn::None,
-        };
-        let (colour, _) = parts(style.color());
-        text::draw(self, words, at, below * em, em, anchor, turn, colour);
-        Ok(())
     }
 }

@@ -1,18 +1,20 @@
 //! A figure: panels above one another over one time axis, each with its legend at its side. Drawn by Plotters, once as
 //! a bitmap and once as SVG.
 
+use super::backend::Pen;
 use super::canvas::Canvas;
 use super::palette::{FAINT_INK, GRID, INK, Rgb};
 use super::{series, text};
 use plotters::coord::Shift;
-use plotters::coord::combinators::BindKeyPoints;
+use plotters::coord::cartesian::Cartesian2d;
+use plotters::coord::ranged1d::{DefaultFormatting, KeyPointHint, Ranged};
 use plotters::prelude::{
-    ChartBuilder, ChartContext, Circle, DashedLineSeries, DrawingArea, DrawingBackend, FontTransform,
-    IntoDrawingArea, IntoFont, LineSeries, PathElement, RGBColor, Ranged, SVGBackend, ShapeStyle, Text,
+    ChartBuilder, ChartContext, Circle, DrawingArea, DrawingBackend, FontDesc, FontFamily, FontStyle,
+    IntoDrawingArea, LabelAreaPosition, LineSeries, PathElement, RGBColor, SVGBackend, ShapeStyle, Text,
     TextStyle, WHITE,
 };
-use plotters::coord::cartesian::Cartesian2d;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
+use plotters_backend::BackendColor;
 use std::fmt::Display;
 use std::ops::Range;
 
@@ -23,8 +25,10 @@ const SVG_SCALE: i32 = 4;
 
 const WIDTH: i32 = 960;
 const TITLE_HEIGHT: i32 = 46;
-const TIME_LABELS_HEIGHT: i32 = 46;
+const TIME_LABELS_HEIGHT: i32 = 42;
 const VALUE_LABELS_WIDTH: i32 = 74;
+/// Left of the rotated label, which Plotters sets flush.
+const VALUE_MARGIN: i32 = 8;
 const LEGEND_WIDTH: i32 = 172;
 const LEGEND_PITCH: i32 = 19;
 const LABEL_SIZE: i32 = 15;
@@ -35,13 +39,17 @@ const LINE_WIDTH: f64 = 1.6;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Dash {
     Solid,
-    Broken(i32, i32),
+    Broken(f64, f64),
 }
 
 impl Dash {
     /// The dashes of the `k`-th of several lines, so that lines that coincide still show.
     pub(super) fn of(k: usize) -> Self {
-        [Self::Solid, Self::Broken(9, 4), Self::Broken(3, 3), Self::Broken(16, 5)][k % 4]
+        let broken = [(9.0, 4.0), (3.0, 3.0), (16.0, 5.0), (11.0, 11.0), (2.0, 7.0)];
+        match k.checked_sub(1).and_then(|k| broken.get(k % broken.len())) {
+            Some((on, off)) => Self::Broken(*on, *off),
+            None => Self::Solid,
+        }
     }
 }
 
@@ -60,8 +68,8 @@ pub(super) struct Line {
 pub(super) enum Axis {
     /// Over this range, in the panel's unit.
     Linear(Range<f64>),
-    /// Over these powers of ten; smaller values sit on the lower edge.
-    Decades(Range<f64>),
+    /// Over these powers of ten; smaller values sit on the lower edge. `None` where no value is above zero.
+    Decades(Option<Range<f64>>),
 }
 
 /// One coordinate system.
@@ -91,7 +99,7 @@ impl Figure {
     pub(super) fn png(&self) -> Result<Vec<u8>, String> {
         let (width, height) = self.size(BITMAP_SCALE);
         let mut canvas = Canvas::new(width as usize, height as usize);
-        let root = (&mut canvas).into_drawing_area();
+        let root = Pen(&mut canvas).into_drawing_area();
         self.draw(&root, BITMAP_SCALE)?;
         drop(root);
         canvas.reduced(BITMAP_SCALE as usize).png().map_err(reason)
@@ -107,7 +115,9 @@ impl Figure {
         // The size in which a viewer shows it; the view box keeps the fine units.
         let fine = format!("width=\"{width}\" height=\"{height}\" viewBox");
         let shown = self.size(1);
-        Ok(file.replacen(&fine, &format!("width=\"{}\" height=\"{}\" viewBox", shown.0, shown.1), 1).into_bytes())
+        Ok(file
+            .replacen(&fine, &format!("width=\"{}\" height=\"{}\" viewBox", shown.0, shown.1), 1)
+            .into_bytes())
     }
 
     /// Width and height.
@@ -131,7 +141,7 @@ impl Figure {
         root.fill(&WHITE).map_err(reason)?;
         let title = letters(TITLE_SIZE, scale, INK).pos(Pos::new(HPos::Left, VPos::Center));
         let corner = (VALUE_LABELS_WIDTH * scale, TITLE_HEIGHT / 2 * scale);
-        root.draw(&Text::new(shortened(&self.title, 72), corner, title)).map_err(reason)?;
+        root.draw(&Text::new(text::shortened(&self.title, 72), corner, title)).map_err(reason)?;
         let mut top = TITLE_HEIGHT;
         for (k, panel) in self.panels.iter().enumerate() {
             let last = k + 1 == self.panels.len();
@@ -153,16 +163,17 @@ impl Figure {
         last: bool,
         scale: i32,
     ) -> Result<(), String> {
-        let time = series::time_range(&self.times);
+        let time = series::to_next_tick(series::time_range(&self.times), 8);
         let time_ticks = series::ticks(&time, 8);
         let (range, ticks, prefix, factor) = match &panel.axis {
             Axis::Linear(range) => {
                 let (prefix, factor) = series::prefix(range.start.abs().max(range.end.abs()));
                 let range = range.start * factor..range.end * factor;
-                let ticks = series::ticks(&range, 5);
+                let ticks = series::ticks(&range, 6);
                 (range, ticks, prefix, factor)
             }
             Axis::Decades(range) => {
+                let range = range.as_ref().unwrap_or(&(-3.0..0.0));
                 let ticks = series::ticks(range, 5).into_iter().filter(|tick| tick.fract() == 0.0).collect();
                 (range.start - 0.1..range.end + 0.1, ticks, "", 1.0)
             }
@@ -170,15 +181,16 @@ impl Figure {
         let mut chart = ChartBuilder::on(area)
             .margin_top(7 * scale)
             .margin_bottom(if last { 2 * scale } else { 7 * scale })
-            .margin_right(10 * scale)
-            .set_label_area_size(plotters::prelude::LabelAreaPosition::Left, VALUE_LABELS_WIDTH * scale)
+            .margin_left(VALUE_MARGIN * scale)
+            .margin_right(14 * scale)
+            .set_label_area_size(LabelAreaPosition::Left, (VALUE_LABELS_WIDTH - VALUE_MARGIN) * scale)
             .set_label_area_size(
-                plotters::prelude::LabelAreaPosition::Bottom,
+                LabelAreaPosition::Bottom,
                 if last { (TIME_LABELS_HEIGHT - 2) * scale } else { 0 },
             )
             .build_cartesian_2d(
-                time.clone().with_key_points(time_ticks.clone()),
-                range.clone().with_key_points(ticks.clone()),
+                Ticked { range: time.clone(), ticks: time_ticks.clone() },
+                Ticked { range: range.clone(), ticks: ticks.clone() },
             )
             .map_err(reason)?;
         let decades = matches!(panel.axis, Axis::Decades(_));
@@ -204,6 +216,12 @@ impl Figure {
             let zero = PathElement::new([(time.start, 0.0), (time.end, 0.0)], ink(FAINT_INK, scale as u32));
             chart.draw_series([zero]).map_err(reason)?;
         }
+        if panel.axis == Axis::Decades(None) {
+            let (_, height) = chart.plotting_area().dim_in_pixel();
+            let at = ((VALUE_LABELS_WIDTH + 12) * scale, height as i32 / 2);
+            let style = letters(LABEL_SIZE, scale, FAINT_INK);
+            return area.draw(&Text::new("no values above zero", at, style)).map_err(reason);
+        }
         // Columns of the bitmap as it is shown: finer ones can't be told apart.
         let columns = (WIDTH - LEGEND_WIDTH - VALUE_LABELS_WIDTH) as usize;
         for line in &panel.lines {
@@ -220,29 +238,58 @@ impl Figure {
     }
 }
 
+/// A linear axis with its ticks where we want them.
+struct Ticked {
+    range: Range<f64>,
+    ticks: Vec<f64>,
+}
+
+impl Ranged for Ticked {
+    type FormatOption = DefaultFormatting;
+    type ValueType = f64;
+
+    fn map(&self, value: &f64, (from, to): (i32, i32)) -> i32 {
+        let share = (value - self.range.start) / (self.range.end - self.range.start);
+        from + (share * f64::from(to - from)).round() as i32
+    }
+
+    fn key_points<H: KeyPointHint>(&self, hint: H) -> Vec<f64> {
+        if hint.weight().allow_light_points() { Vec::new() } else { self.ticks.clone() }
+    }
+
+    fn range(&self) -> Range<f64> {
+        self.range.clone()
+    }
+}
+
 /// Draws one unbroken stretch of a signal.
-fn draw_line<B, X, Y>(
-    chart: &mut ChartContext<'_, B, Cartesian2d<X, Y>>,
+fn draw_line<B: DrawingBackend>(
+    chart: &mut ChartContext<'_, B, Cartesian2d<Ticked, Ticked>>,
     points: Vec<(f64, f64)>,
     line: &Line,
     scale: i32,
-) -> Result<(), String>
-where
-    B: DrawingBackend,
-    X: Ranged<ValueType = f64>,
-    Y: Ranged<ValueType = f64>,
-{
+) -> Result<(), String> {
     let style = pen(line.colour, scale);
-    let drawn = match (line.dash, points.as_slice()) {
-        (_, [single]) => {
-            chart.draw_series([Circle::new(*single, 2 * scale, style.filled())]).map(|_| ())
-        }
-        (Dash::Solid, _) => chart.draw_series(LineSeries::new(points, style)).map(|_| ()),
-        (Dash::Broken(on, off), _) => {
-            chart.draw_series(DashedLineSeries::new(points, on * scale, off * scale, style)).map(|_| ())
+    if let [single] = points.as_slice() {
+        return chart
+            .draw_series([Circle::new(*single, 2 * scale, style.filled())])
+            .map(|_| ())
+            .map_err(reason);
+    }
+    let parts = match line.dash {
+        Dash::Solid => vec![points],
+        Dash::Broken(on, off) => {
+            let (width, height) = chart.plotting_area().dim_in_pixel();
+            let (times, values) = (chart.x_range(), chart.y_range());
+            let shown = |pixels: u32| f64::from(pixels) / f64::from(scale);
+            let pixels =
+                (shown(width) / (times.end - times.start), shown(height) / (values.end - values.start));
+            series::dashes(&points, pixels, (on, off))
         }
     };
-    drawn.map_err(reason)
+    parts
+        .into_iter()
+        .try_for_each(|part| chart.draw_series(LineSeries::new(part, style)).map(|_| ()).map_err(reason))
 }
 
 fn draw_legend<B: DrawingBackend>(
@@ -254,24 +301,22 @@ fn draw_legend<B: DrawingBackend>(
     let mut y = 15;
     if !panel.heading.is_empty() {
         let at = (4 * scale, y * scale);
-        area.draw(&Text::new(shortened(&panel.heading, 22), at, words(INK))).map_err(reason)?;
+        area.draw(&Text::new(text::shortened(&panel.heading, 22), at, words(INK))).map_err(reason)?;
         y += LEGEND_PITCH;
     }
     for line in &panel.lines {
-        let sample = [(4 * scale, y * scale), (36 * scale, y * scale)];
-        let style = pen(line.colour, scale);
-        match line.dash {
-            Dash::Solid => area.draw(&PathElement::new(sample, style)),
-            Dash::Broken(on, off) => area.draw(&plotters::element::DashedPathElement::new(
-                sample,
-                on * scale,
-                off * scale,
-                style,
-            )),
+        let sample = [(4.0, f64::from(y)), (36.0, f64::from(y))];
+        let parts = match line.dash {
+            Dash::Solid => vec![sample.to_vec()],
+            Dash::Broken(on, off) => series::dashes(&sample, (1.0, 1.0), (on, off)),
+        };
+        for part in parts {
+            let fine = |v: f64| (v * f64::from(scale)).round() as i32;
+            let part: Vec<(i32, i32)> = part.into_iter().map(|(x, y)| (fine(x), fine(y))).collect();
+            area.draw(&PathElement::new(part, pen(line.colour, scale))).map_err(reason)?;
         }
-        .map_err(reason)?;
         let at = (43 * scale, y * scale);
-        area.draw(&Text::new(shortened(&line.name, 17), at, words(INK))).map_err(reason)?;
+        area.draw(&Text::new(text::shortened(&line.name, 17), at, words(INK))).map_err(reason)?;
         y += LEGEND_PITCH;
     }
     Ok(())
@@ -290,14 +335,9 @@ fn pen(colour: Rgb, scale: i32) -> ShapeStyle {
 }
 
 fn letters(size: i32, scale: i32, colour: Rgb) -> TextStyle<'static> {
-    TextStyle::from(("sans-serif", size * scale).into_font().transform(FontTransform::None))
-        .color(&RGBColor(colour[0], colour[1], colour[2]))
-}
-
-/// At most `length` letters, the last one an ellipsis where some are missing.
-fn shortened(words: &str, length: usize) -> String {
-    if words.chars().count() <= length {
-        return words.to_owned();
+    TextStyle {
+        font: FontDesc::new(FontFamily::SansSerif, f64::from(size * scale), FontStyle::Normal),
+        color: BackendColor { alpha: 1.0, rgb: (colour[0], colour[1], colour[2]) },
+        pos: Pos::default(),
     }
-    words.chars().take(length.saturating_sub(1)).chain(['…']).collect()
 }

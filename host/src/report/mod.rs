@@ -16,9 +16,12 @@
 //! [`canvas`] and [`text`] are the bitmap under all of it.
 
 mod animation;
+mod backend;
 mod camera;
 mod canvas;
 mod chart;
+#[cfg(test)]
+mod fixture;
 mod mesh;
 mod palette;
 mod picture;
@@ -27,13 +30,14 @@ mod quantise;
 mod raster;
 mod scene3d;
 mod series;
+mod skeleton;
 #[cfg(test)]
 mod tests;
 mod text;
 
 use crate::Hand;
 use crate::plant::polyhedron::Polyhedron;
-use crate::sim::trace::Sample;
+use crate::record::sample::Sample;
 use std::path::{Path, PathBuf};
 use std::{fs, io};
 
@@ -103,7 +107,10 @@ pub fn write(dir: &Path, report: &Report<'_>) -> Result<(), ReportError> {
     }
     let stage = scene3d::Stage::new(report);
     for moment in [picture::Moment::Start, picture::Moment::End] {
-        save(format!("{}.png", moment.file_name()), picture::draw(report, &stage, moment).png().map_err(|e| e.to_string()))?;
+        save(
+            format!("{}.png", moment.file_name()),
+            picture::draw(report, &stage, moment).png().map_err(|e| e.to_string()),
+        )?;
     }
     save("grasp.gif".to_owned(), animation::draw(report, &stage))
 }

@@ -1,10 +1,10 @@
 //! What the figures show: joint velocities, object velocities, contact forces, residuals.
 
 use super::chart::{Axis, Dash, Figure, Line, Panel};
-use super::palette::{self, BLACK, BLUE, GREEN, ORANGE, VERMILLION};
+use super::palette::{self, BLACK, BLUE, VERMILLION};
 use super::series;
 use crate::Hand;
-use crate::sim::trace::{ContactSample, Sample};
+use crate::record::sample::{ContactSample, Sample};
 use nalgebra::Vector3;
 
 /// One figure of a run and the name of its files, without the ending.
@@ -25,10 +25,7 @@ pub(super) fn all(title: &str, hand: &Hand, joint_names: &[String], samples: &[S
             name: "joint-velocities",
             figure: figure("joint velocities", joint_panels(hand, joint_names, samples)),
         },
-        Plot {
-            name: "object-velocities",
-            figure: figure("velocity of the object", object_panels(samples)),
-        },
+        Plot { name: "object-velocities", figure: figure("velocity of the object", object_panels(samples)) },
         Plot { name: "contact-forces", figure: figure("contact forces", force_panels(hand, samples)) },
         Plot { name: "residuals", figure: figure("residuals of Eq. 38", residual_panels(hand, samples)) },
     ]
@@ -44,7 +41,9 @@ fn joint_panels(hand: &Hand, names: &[String], samples: &[Sample]) -> Vec<Panel>
     let shared: Vec<usize> = (0..hand.joint_count()).filter(|&k| fingers_moved(k) > 1).collect();
     let fingers: Vec<_> = (0..hand.fingertip_count()).map(own).collect();
     let range = |joints: &[usize]| {
-        series::linear_range(samples.iter().flat_map(|s| joints.iter().filter_map(|&k| s.speeds_rad_s.get(k).copied())))
+        series::linear_range(
+            samples.iter().flat_map(|s| joints.iter().filter_map(|&k| s.speeds_rad_s.get(k).copied())),
+        )
     };
     let finger_range = range(&fingers.iter().flat_map(|(_, joints)| joints.clone()).collect::<Vec<_>>());
     let shared_range = range(&shared);
@@ -60,7 +59,10 @@ fn joint_panels(hand: &Hand, names: &[String], samples: &[Sample]) -> Vec<Panel>
                 name: names.get(joint).cloned().unwrap_or_else(|| format!("joint {}", joint + 1)),
                 colour: palette::of(order),
                 dash: Dash::of(order),
-                values: samples.iter().map(|s| s.speeds_rad_s.get(joint).copied().unwrap_or(f64::NAN)).collect(),
+                values: samples
+                    .iter()
+                    .map(|s| s.speeds_rad_s.get(joint).copied().unwrap_or(f64::NAN))
+                    .collect(),
             })
             .collect(),
     };
@@ -92,11 +94,6 @@ fn object_panels(samples: &[Sample]) -> Vec<Panel> {
     ]
 }
 
-/// How much of a contact is tangential: the length of `(lambda_X, lambda_Z)`.
-fn tangential(contact: &ContactSample) -> f64 {
-    Vector3::new(contact.lambda_n[0], contact.lambda_n[1], 0.0).norm()
-}
-
 /// A signal of one finger's contact.
 fn of_contact(samples: &[Sample], finger: usize, value: impl Fn(&ContactSample) -> f64) -> Vec<f64> {
     samples.iter().map(|s| s.contacts.get(finger).map_or(f64::NAN, &value)).collect()
@@ -106,7 +103,7 @@ fn of_contact(samples: &[Sample], finger: usize, value: impl Fn(&ContactSample) 
 fn force_panels(hand: &Hand, samples: &[Sample]) -> Vec<Panel> {
     let all = samples.iter().flat_map(|s| &s.contacts);
     let range = series::linear_range(
-        all.flat_map(|c| [c.normal_force_n, c.desired_normal_force_n, tangential(c)]),
+        all.flat_map(|c| [c.normal_force_n, c.desired_normal_force_n, c.tangential_force_n()]),
     );
     let line = |name: &str, colour, dash, values| Line { name: name.to_owned(), colour, dash, values };
     (0..hand.fingertip_count())
@@ -117,11 +114,16 @@ fn force_panels(hand: &Hand, samples: &[Sample]) -> Vec<Panel> {
             axis: Axis::Linear(range.clone()),
             lines: vec![
                 line("normal", BLUE, Dash::Solid, of_contact(samples, finger, |c| c.normal_force_n)),
-                line("tangential", VERMILLION, Dash::Solid, of_contact(samples, finger, tangential)),
+                line(
+                    "tangential",
+                    VERMILLION,
+                    Dash::Solid,
+                    of_contact(samples, finger, ContactSample::tangential_force_n),
+                ),
                 line(
                     "desired (Eq. 57)",
                     BLACK,
-                    Dash::Broken(7, 5),
+                    Dash::Broken(7.0, 5.0),
                     of_contact(samples, finger, |c| c.desired_normal_force_n),
                 ),
             ],
@@ -139,7 +141,7 @@ fn residual_panels(hand: &Hand, samples: &[Sample]) -> Vec<Panel> {
         lines: (0..hand.fingertip_count())
             .map(|finger| Line {
                 name: format!("finger {}", finger + 1),
-                colour: [BLUE, VERMILLION, GREEN, ORANGE, BLACK][finger % 5],
+                colour: palette::of(finger),
                 dash: Dash::of(finger),
                 values: of_contact(samples, finger, of),
             })

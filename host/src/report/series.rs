@@ -68,6 +68,16 @@ pub(super) fn time_range(times: &[f64]) -> Range<f64> {
     if high > low { low..high } else { low - 0.5..low + 0.5 }
 }
 
+/// `range`, lengthened a little where that lets it end at a tick: a run of 5 s has its last sample at 4.999 s.
+pub(super) fn to_next_tick(range: Range<f64>, count: usize) -> Range<f64> {
+    let slack = 0.004 * (range.end - range.start);
+    let longer = range.start..range.end + slack;
+    match ticks(&longer, count).last() {
+        Some(last) if *last > range.end => range.start..*last,
+        _ => range,
+    }
+}
+
 /// Smallest and largest finite value; `None` where there is none.
 pub(super) fn extremes(values: impl Iterator<Item = f64>) -> Option<(f64, f64)> {
     values.filter(|v| v.is_finite()).fold(None, |range, v| match range {
@@ -84,20 +94,56 @@ pub(super) fn linear_range(values: impl Iterator<Item = f64>) -> Range<f64> {
     let air = 0.06 * (high - low);
     match (low < 0.0, high > 0.0) {
         (false, false) => -1.0..1.0,
-        (below, above) => (low - if below { air } else { air / 2.0 })..(high + if above { air } else { air / 2.0 }),
+        (below, above) => {
+            (low - if below { air } else { air / 2.0 })..(high + if above { air } else { air / 2.0 })
+        }
     }
 }
 
-/// A range of powers of ten for a logarithmic axis: from the largest value down, at most nine decades.
-pub(super) fn decades(values: impl Iterator<Item = f64>) -> Range<f64> {
-    match extremes(values.filter(|v| *v > 0.0)) {
-        Some((low, high)) => {
-            let top = high.log10().ceil();
-            let bottom = low.log10().floor().max(top - 9.0);
-            bottom.min(top - 1.0)..top
+/// A range of powers of ten for a logarithmic axis: from the largest value down, at most nine decades. `None` where
+/// nothing is larger than zero.
+pub(super) fn decades(values: impl Iterator<Item = f64>) -> Option<Range<f64>> {
+    let (low, high) = extremes(values.filter(|v| *v > 0.0))?;
+    let top = high.log10().ceil();
+    let bottom = low.log10().floor().max(top - 9.0);
+    Some(bottom.min(top - 1.0)..top)
+}
+
+/// Cuts a line into dashes of `on` pixels with gaps of `off`; `pixels` are the lengths of a unit along both axes.
+///
+/// A dash is as long as the line that it follows, except that a climb counts as no steeper than three: a signal that
+/// fills a band then shows as a hatched band, through which the lines behind it are seen.
+pub(super) fn dashes(
+    points: &[(f64, f64)],
+    pixels: (f64, f64),
+    (on, off): (f64, f64),
+) -> Vec<Vec<(f64, f64)>> {
+    let mut dashes = vec![points.first().copied().into_iter().collect::<Vec<_>>()];
+    let (mut drawing, mut left) = (true, on);
+    for pair in points.windows(2) {
+        let (from, to) = (pair[0], pair[1]);
+        let along = (to.0 - from.0).abs() * pixels.0;
+        let climb = ((to.1 - from.1).abs() * pixels.1).min(3.0 * along);
+        let length = nalgebra::Vector2::new(along, climb).norm();
+        let mut done = 0.0;
+        while length - done > left {
+            done += left;
+            let share = done / length;
+            let cut = (from.0 + (to.0 - from.0) * share, from.1 + (to.1 - from.1) * share);
+            if drawing {
+                dashes.last_mut().into_iter().for_each(|dash| dash.push(cut));
+            } else {
+                dashes.push(vec![cut]);
+            }
+            drawing = !drawing;
+            left = if drawing { on } else { off };
         }
-        None => -3.0..0.0,
+        left -= length - done;
+        if drawing {
+            dashes.last_mut().into_iter().for_each(|dash| dash.push(to));
+        }
     }
+    dashes
 }
 
 /// Round positions in `range`, about `count` of them: multiples of 1, 2 or 5 times a power of ten.
@@ -172,9 +218,21 @@ mod tests {
         assert_eq!(linear_range(std::iter::empty()), -1.0..1.0);
         assert_eq!(time_range(&[2.0]), 1.5..2.5);
         assert_eq!(time_range(&[f64::NAN]), 0.0..1.0);
-        assert_eq!(decades([0.0, f64::NAN].into_iter()), -3.0..0.0);
-        assert_eq!(decades([1e-30, 0.5].into_iter()), -9.0..0.0);
-        assert_eq!(decades([1.0].into_iter()), -1.0..0.0);
+        assert_eq!(decades([0.0, f64::NAN].into_iter()), None);
+        assert_eq!(decades([1e-30, 0.5].into_iter()), Some(-9.0..0.0));
+        assert_eq!(decades([1.0].into_iter()), Some(-1.0..0.0));
+    }
+
+    #[test]
+    fn dashes_follow_the_line() {
+        let flat = dashes(&[(0.0, 1.0), (25.0, 1.0)], (1.0, 1.0), (6.0, 4.0));
+        let ends: Vec<(f64, f64)> = flat.iter().map(|dash| (dash[0].0, dash[dash.len() - 1].0)).collect();
+        assert_eq!(ends, [(0.0, 6.0), (10.0, 16.0), (20.0, 25.0)]);
+        // A zigzag over two pixels a swing, 1,000 high: as if it climbed three for one.
+        let zigzag: Vec<(f64, f64)> = (0..100).map(|k| (f64::from(k), f64::from(k % 2) * 1000.0)).collect();
+        let hatched = dashes(&zigzag, (1.0, 1.0), (6.0, 4.0));
+        assert!((28..36).contains(&hatched.len()), "{}", hatched.len());
+        assert_eq!(dashes(&[], (1.0, 1.0), (6.0, 4.0)), [[]]);
     }
 
     #[test]

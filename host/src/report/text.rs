@@ -97,3 +97,11 @@ pub(super) fn draw(
         });
     }
 }
+
+/// At most `length` letters, the last one an ellipsis where some are missing.
+pub(super) fn shortened(words: &str, length: usize) -> String {
+    if words.chars().count() <= length {
+        return words.to_owned();
+    }
+    words.chars().take(length.saturating_sub(1)).chain(['…']).collect()
+}

@@ -75,13 +75,14 @@ pub struct ContactFile {
     /// Index of the face, from 0; without it the face is the one that the point lies on.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub face: Option<usize>,
-    /// A point of the face in the object frame, m. Needed unless `start.angles_rad` places the fingers.
+    /// A point of the face in the object frame, m; without it, the mean of the face's corners. Does nothing but find the
+    /// face where `start.angles_rad` places the fingers.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub point_m: Option<[f64; 3]>,
 }
 
 /// How the run begins, at rest.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct StartFile {
     /// How deep the fingertips are indented.
@@ -93,12 +94,6 @@ pub struct StartFile {
     /// Angles of all joints, rad. They replace the inverse kinematics: contact points and indentations follow.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub angles_rad: Option<Vec<f64>>,
-}
-
-impl Default for StartFile {
-    fn default() -> Self {
-        Self { indentation_m: Indentation::default(), trunk_rad: BTreeMap::new(), angles_rad: None }
-    }
 }
 
 /// Indentation `dr_i` at the start.
@@ -342,11 +337,14 @@ pub struct JointFile {
     /// How far the joint gives before its Coulomb friction lets it slide, rad.
     #[serde(default = "JointFile::presliding_rad")]
     pub presliding_rad: f64,
+    /// Damping of the joint while it sticks, N m s/rad.
+    #[serde(default)]
+    pub presliding_damping_nm_s_rad: f64,
 }
 
 impl JointFile {
     fn presliding_rad() -> f64 {
-        1e-3
+        2e-4
     }
 }
 
@@ -414,8 +412,8 @@ pub enum ShapeFile {
         /// Side lengths along x, y and z, m.
         size_m: [f64; 3],
     },
-    /// A right prism over a regular polygon, its axis along z. Faces: the sides, beginning with the one that looks along -y
-    /// and going counter-clockwise seen from +z; then bottom (-z) and top (+z).
+    /// A right prism over a regular polygon, its axis along z. Faces: the sides, beginning with the one that looks
+    /// along -y and going counter-clockwise seen from +z; then bottom (-z) and top (+z).
     Prism {
         /// Number of sides.
         sides: u32,
@@ -424,7 +422,8 @@ pub enum ShapeFile {
         /// Extent along z, m.
         height_m: f64,
     },
-    /// A right prism over a convex polygon, its axis along z. Faces: the sides from each corner to the next, bottom, top.
+    /// A right prism over a convex polygon, its axis along z. Faces: the sides from each corner to the next; then
+    /// bottom and top.
     PolygonPrism {
         /// Corners x, y, m, counter-clockwise seen from +z.
         corners_m: Vec<[f64; 2]>,

@@ -8,15 +8,34 @@
 //!
 //! Frames: the *base frame* of the hand is the world; the *object frame* has its origin at the object's centre of mass.
 
+mod build;
+mod check;
+mod error;
 pub mod file;
+mod hand;
+mod library;
+mod object;
+pub mod placement;
+mod read;
+mod start;
+#[cfg(test)]
+mod tests;
+mod tree;
 
-use crate::{Hand, plant::polyhedron::Polyhedron};
+use crate::Hand;
+use crate::plant::contact::{FaceContact, FingertipModel};
+use crate::plant::friction::JointFriction;
+use crate::plant::polyhedron::Polyhedron;
+use library::{Document, Kind};
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
+use std::path::Path;
+use tree::{Node, Setting};
 
-pub use file::{Actuators, Control, Friction, PlantSettings, SceneFile, Sensors};
+pub use error::{Place, SceneError};
+pub use file::{Actuators, Control, Friction, HandFile, ObjectFile, PlantSettings, SceneFile, Sensors};
 
 /// A scene, checked and ready for the simulator.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Scene {
     /// Its name.
     pub name: String,
@@ -31,7 +50,7 @@ pub struct Scene {
     /// One a joint, in the hand's order.
     pub joints: Vec<JointParameters>,
     /// One a fingertip, in the hand's order.
-    pub fingertips: Vec<FingertipParameters>,
+    pub fingertips: Vec<FingertipModel>,
     /// The object in its own frame.
     pub object: Polyhedron,
     /// Its name.
@@ -62,8 +81,8 @@ pub struct Scene {
     pub file: SceneFile,
 }
 
-/// What the simulator needs to know of a joint besides the [`Hand`]. Limits and friction are those that the scene asks for:
-/// switched off, they are infinite and zero.
+/// What the simulator needs to know of a joint besides the [`Hand`]. Torque limit and friction are those that the
+/// scene asks for: switched off, they are infinite and zero.
 #[derive(Clone, Debug, PartialEq)]
 pub struct JointParameters {
     /// Its name.
@@ -76,48 +95,8 @@ pub struct JointParameters {
     pub speed_limit_rad_s: f64,
     /// Encoder counts in one turn of the joint.
     pub encoder_counts_per_turn: f64,
-    /// Viscous friction, with the scene's factor, N m s/rad.
-    pub viscous_friction_nm_s_rad: f64,
-    /// Coulomb friction, with the scene's factor, N m.
-    pub coulomb_friction_nm: f64,
-    /// How far the joint gives before its Coulomb friction lets it slide, rad.
-    pub presliding_rad: f64,
-}
-
-/// What the simulator needs to know of a soft fingertip besides the [`Hand`].
-#[derive(Clone, Debug, PartialEq)]
-pub struct FingertipParameters {
-    /// Its name.
-    pub name: String,
-    /// Radius `r_i`, m.
-    pub radius_m: f64,
-    /// Stiffness `k_i` of Eq. 14, N/m^2.
-    pub stiffness_n_m2: f64,
-    /// Damping `xi_i` of Eq. 14 for each square metre of contact area, (N s/m)/m^2.
-    pub damping_n_s_m_per_m2: f64,
-    /// Torsional damping `b_i` of Eq. 15 for each square metre of contact area, (N m s/rad)/m^2.
-    pub torsional_damping_nm_s_rad_per_m2: f64,
-}
-
-impl FingertipParameters {
-    /// Contact area `pi (2 r dr - dr^2)` of Table I at the indentation `dr`, m^2; zero without contact.
-    pub fn contact_area_m2(&self, indentation_m: f64) -> f64 {
-        let indentation_m = indentation_m.max(0.0);
-        std::f64::consts::PI * (2.0 * self.radius_m - indentation_m) * indentation_m
-    }
-}
-
-/// The face that a fingertip touches, as the paper sees it.
-#[derive(Clone, Debug, PartialEq)]
-pub struct FaceContact {
-    /// Index of the face.
-    pub face: usize,
-    /// `R_Ci` of Eq. 3: columns `C_X`, `C_Y` (the face's normal **into** the object) and `C_Z` in the object frame.
-    pub frame: Matrix3<f64>,
-    /// `Y_i` of Eq. 5: distance of the face's plane from the centre of mass, m.
-    pub distance_m: f64,
-    /// Contact point at the start in the object frame, m.
-    pub point_m: Vector3<f64>,
+    /// Friction, with the scene's factor.
+    pub friction: JointFriction,
 }
 
 /// Where everything is at the start.
@@ -131,4 +110,85 @@ pub struct Start {
     pub attitude: UnitQuaternion<f64>,
     /// Indentation `dr_i` of each fingertip, m.
     pub indentations_m: Vec<f64>,
+    /// Contact point of each fingertip in the object frame, m.
+    pub points_m: Vec<Vector3<f64>>,
+}
+
+impl Scene {
+    /// Loads a scene by its built-in name or by its path, which ends in `.toml` or contains a separator, with settings
+    /// `KEY=VALUE`: keys of the effective configuration such as `control.force_n` or `hand.joint.3.mass_kg`. Items of a
+    /// list go by their number from 1, by the `name` they have, or `*` for all.
+    ///
+    /// # Errors
+    /// One line: where, which key, what is wrong, what to do.
+    pub fn load(name_or_path: &str, settings: &[String]) -> Result<Self, SceneError> {
+        let document = Document::open(Kind::Scene, name_or_path, Path::new(""))
+            .map_err(|error| error.at(&Place::whole(name_or_path)))?;
+        Self::from_document(document, settings)
+    }
+
+    /// Reads a scene from a text. `source` is its name in errors; references are relative to `folder`.
+    ///
+    /// # Errors
+    /// One line: where, which key, what is wrong, what to do.
+    pub fn parse(text: &str, source: &str, folder: &Path, settings: &[String]) -> Result<Self, SceneError> {
+        Self::from_document(Document::parse(text, source, folder)?, settings)
+    }
+
+    fn from_document(document: Document, settings: &[String]) -> Result<Self, SceneError> {
+        let settings = settings.iter().map(|text| Setting::parse(text)).collect::<Result<Vec<_>, _>>()?;
+        let tree = document.complete_scene(&settings)?;
+        let file = read::read(&tree, "")?;
+        build::scene(file).map_err(|error| {
+            let place = tree.place_of(&error.key).clone();
+            error.at(&place)
+        })
+    }
+
+    /// Checks and prepares a scene that was put together in code.
+    ///
+    /// # Errors
+    /// One line: which key, what is wrong, what to do.
+    pub fn build(file: SceneFile) -> Result<Self, SceneError> {
+        build::scene(file)
+    }
+
+    /// The effective configuration, hand and object included. Reading it gives this scene again.
+    pub fn effective_toml(&self) -> String {
+        // Only what TOML can't express fails, and none of the structs contains such a thing.
+        toml::to_string(&self.file).unwrap_or_default()
+    }
+
+    /// Names of the built-in scenes.
+    pub fn built_in() -> impl Iterator<Item = &'static str> {
+        Kind::Scene.built_in().iter().map(|(name, _)| *name)
+    }
+}
+
+impl HandFile {
+    /// Loads a hand by its built-in name or by its path.
+    ///
+    /// # Errors
+    /// What is wrong with the file as a file; a [`Scene`] checks the numbers.
+    pub fn load(name_or_path: &str) -> Result<Self, SceneError> {
+        let mut node = open(Kind::Hand, name_or_path)?;
+        library::complete_hand(&mut node);
+        read::read(&node, "")
+    }
+}
+
+impl ObjectFile {
+    /// Loads an object by its built-in name or by its path.
+    ///
+    /// # Errors
+    /// What is wrong with the file as a file; a [`Scene`] checks the numbers.
+    pub fn load(name_or_path: &str) -> Result<Self, SceneError> {
+        read::read(&open(Kind::Object, name_or_path)?, "")
+    }
+}
+
+fn open(kind: Kind, name_or_path: &str) -> Result<Node, SceneError> {
+    Document::open(kind, name_or_path, Path::new(""))
+        .map(|document| document.node)
+        .map_err(|error| error.at(&Place::whole(name_or_path)))
 }

@@ -164,7 +164,7 @@ impl<T: Real, const J: usize, const F: usize> Hand<T, J, F> {
             joint_count: joints.len(),
             fingertip_count: fingertips.len(),
             joints: [PreparedJoint::still(); J],
-            fingertips: [Fingertip { link: 0, offset_m: Vector3::zeros(), radius_m: T::zero() }; F],
+            fingertips: [no_fingertip(); F],
         };
         for (k, joint) in joints.iter().enumerate() {
             check_joint(k, joint)?;
@@ -199,6 +199,24 @@ impl<T: Real, const J: usize, const F: usize> Hand<T, J, F> {
                 radius_m: U::from_f64(fingertip.radius_m.to_f64()),
             }),
         }
+    }
+
+    /// The same hand in another capacity: exact sizes for firmware.
+    ///
+    /// # Errors
+    /// It does not fit.
+    pub fn fit<const K: usize, const G: usize>(&self) -> Result<Hand<T, K, G>, HandError> {
+        check_counts::<K, G>(self.joint_count, self.fingertip_count)?;
+        Ok(Hand {
+            joint_count: self.joint_count,
+            fingertip_count: self.fingertip_count,
+            joints: core::array::from_fn(|k| {
+                self.joints.get(k).copied().unwrap_or_else(PreparedJoint::still)
+            }),
+            fingertips: core::array::from_fn(|i| {
+                self.fingertips.get(i).copied().unwrap_or_else(no_fingertip)
+            }),
+        })
     }
 
     /// Number of joints.
@@ -307,6 +325,11 @@ impl<T: Real> PreparedJoint<T> {
             },
         }
     }
+}
+
+/// A fingertip that is not there: fills the unused capacity.
+fn no_fingertip<T: Real>() -> Fingertip<T> {
+    Fingertip { link: 0, offset_m: Vector3::zeros(), radius_m: T::zero() }
 }
 
 fn cast<T: Real, U: Real>(v: &Vector3<T>) -> Vector3<U> {

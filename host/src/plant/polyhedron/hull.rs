@@ -10,12 +10,13 @@ const FLAT: f64 = 1e-9;
 /// A body is flat when it is thinner than this, in units of its extent.
 const THIN: f64 = 1e-6;
 
+/// Vertices, and faces as loops of vertices.
+type Hull = (Vec<Vector3<f64>>, Vec<Vec<usize>>);
+
 /// Vertices of the hull and its faces as loops of vertices, counter-clockwise seen from outside.
 ///
 /// The points are finite, distinct, and at most 128.
-pub(super) fn faces(
-    points: &[Vector3<f64>],
-) -> Result<(Vec<Vector3<f64>>, Vec<Vec<usize>>), PolyhedronError> {
+pub(super) fn faces(points: &[Vector3<f64>]) -> Result<Hull, PolyhedronError> {
     let scale = points.iter().map(|p| (p - points[0]).amax()).fold(0.0, f64::max);
     let unit: Vec<Vector3<f64>> = points.iter().map(|p| (p - points[0]) / scale).collect();
     if !unit.iter().all(|p| p.iter().all(|v| v.is_finite())) || is_flat(&unit) {
@@ -144,7 +145,7 @@ fn is_closed(loops: &[Vec<usize>]) -> bool {
 }
 
 /// Keeps the points that are corners.
-fn renumber(points: &[Vector3<f64>], mut loops: Vec<Vec<usize>>) -> (Vec<Vector3<f64>>, Vec<Vec<usize>>) {
+fn renumber(points: &[Vector3<f64>], mut loops: Vec<Vec<usize>>) -> Hull {
     let mut vertices = Vec::new();
     let mut place = vec![None; points.len()];
     for corner in loops.iter_mut().flatten() {

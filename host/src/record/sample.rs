@@ -1,4 +1,4 @@
-//! What a run leaves behind: one sample per control tick.
+//! One sample a control tick: the state of everything.
 
 use nalgebra::{UnitQuaternion, Vector3};
 
@@ -54,4 +54,12 @@ pub struct ContactSample {
     pub force_residual_n: Vector3<f64>,
     /// Residual moment `Delta lambda_i2` of Eq. 38 in the contact frame, N m.
     pub moment_residual_nm: Vector3<f64>,
+}
+
+impl ContactSample {
+    /// Tangential force, N.
+    pub fn tangential_force_n(&self) -> f64 {
+        let [x, z] = self.lambda_n;
+        nalgebra::Vector2::new(x, z).norm()
+    }
 }

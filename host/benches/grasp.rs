@@ -1,0 +1,126 @@
+//! `cargo bench`: the tick and the law on the host, one step of the plant, and a whole run.
+
+use blindgrasp::plant::{Motion, Plant};
+use blindgrasp::scene::Scene;
+use blindgrasp::sim::{self, Simulation};
+use blindgrasp::{MAX_JOINTS, Posture};
+use blindgrasp_shared::command::Command;
+use blindgrasp_shared::control::{GraspConfig, Grip, Latch};
+use blindgrasp_shared::estimate::{Encoder, EstimatorConfig};
+use blindgrasp_shared::fault::FaultConfig;
+use blindgrasp_shared::hand::{Hand, Posture as PostureOf};
+use blindgrasp_shared::limit::LimitConfig;
+use blindgrasp_shared::supervisor::SupervisorConfig;
+use blindgrasp_shared::tick::{Config, Params, State, tick};
+use criterion::{Criterion, Throughput, criterion_group, criterion_main};
+use nalgebra::Vector3;
+use std::f64::consts::TAU;
+use std::hint::black_box;
+
+/// Joints and fingers of the hand, exactly: what the firmware is built with.
+const J: usize = 12;
+const F: usize = 3;
+
+fn cube() -> Scene {
+    Scene::load("cube", &[]).expect("the scene is built in")
+}
+
+fn hand(scene: &Scene) -> Hand<f32, J, F> {
+    scene.hand.fit().expect("twelve joints and three fingers").cast()
+}
+
+fn gains(scene: &Scene) -> GraspConfig<f32, J> {
+    GraspConfig {
+        force_n: scene.control.force_n as f32,
+        attitude_stiffness_nm: scene.control.attitude_stiffness_nm as f32,
+        damping_nm_s: std::array::from_fn(|k| scene.joints[k].damping_gain_nm_s_rad as f32),
+        gravity_m_s2: Some(Vector3::new(0.0, 0.0, -9.81)),
+    }
+}
+
+fn angles(scene: &Scene) -> [f32; J] {
+    std::array::from_fn(|k| scene.start.angles_rad[k] as f32)
+}
+
+fn controller(criterion: &mut Criterion) {
+    let scene = cube();
+    let (hand, gains, angles) = (hand(&scene), gains(&scene), angles(&scene));
+    let law = gains.prepare(&hand).expect("gains");
+    let mut posture = PostureOf::at_base();
+    hand.forward_kinematics(&angles, &mut posture);
+    let latch = Latch::of(&posture);
+    let speeds = [0.01; J];
+    criterion.bench_function("forward kinematics and law (f32, 12 joints)", |bencher| {
+        bencher.iter(|| {
+            hand.forward_kinematics(black_box(&angles), &mut posture);
+            let grip = Grip { latch: &latch, force_share: 1.0, attitude_share: 1.0 };
+            law.torques(&hand, &posture, black_box(&speeds), Some(grip))
+        });
+    });
+
+    let per_turn = scene.joints[0].encoder_counts_per_turn;
+    let encoder = Encoder { zero_count: 0, rad_per_count: (TAU / per_turn) as f32, reversed: false };
+    let config = Config {
+        period_us: 1000,
+        estimator: EstimatorConfig { bandwidth_hz: 50.0, encoders: [encoder; J] },
+        law: gains,
+        limits: LimitConfig { torque_nm: Some([1.3878; J]), slew_nm_s: Some([1000.0; J]), stops: None },
+        faults: FaultConfig { possible_speed_rad_s: Some([200.0; J]), ..FaultConfig::LEAST },
+        supervisor: SupervisorConfig { soft_start_ms: 0, release_ms: 300 },
+    };
+    let params = Params::new(hand, &config).expect("parameters");
+    let mut state = State::new();
+    let counts = angles.map(|angle| (f64::from(angle) * per_turn / TAU) as i32);
+    for command in [Command::Arm, Command::Grasp] {
+        tick(&params, &mut state, &counts, Some(command));
+    }
+    criterion.bench_function("tick (f32, 12 joints)", |bencher| {
+        bencher.iter(|| tick(&params, &mut state, black_box(&counts), None));
+    });
+    let mut buffer = [0; 512];
+    let record = tick(&params, &mut state, &counts, None).record;
+    criterion.bench_function("encode a record (12 joints)", |bencher| {
+        bencher.iter(|| black_box(&record).encode(&mut buffer).map(<[u8]>::len));
+    });
+}
+
+fn plant(criterion: &mut Criterion) {
+    let scene = Scene::load("cube-ideal", &[]).expect("the scene is built in");
+    let mut angles = [0.0; MAX_JOINTS];
+    angles[..J].copy_from_slice(&scene.start.angles_rad);
+    let start = Motion::at_rest(angles, scene.start.position_m, scene.start.attitude);
+    let begin = || Plant::new(sim::model(&scene), start, scene.plant.substep_s).expect("a plant");
+    let law = sim::law(&scene).expect("gains");
+    let mut posture = Posture::at_base();
+    scene.hand.forward_kinematics(&angles, &mut posture);
+    let latch = Latch::of(&posture);
+    let grip = Grip { latch: &latch, force_share: 1.0, attitude_share: 1.0 };
+    let (torques, _) = law.torques(&scene.hand, &posture, &[0.0; MAX_JOINTS], Some(grip));
+    let mut plant = begin();
+    let mut steps = 0;
+    criterion.bench_function("plant step (12 joints and cube)", |bencher| {
+        bencher.iter(|| {
+            // Constant torques lose the grasp in the end: begin anew well before that.
+            steps += 1;
+            if steps % 100 == 0 {
+                plant = begin();
+            }
+            plant.solve(black_box(&torques)).expect("the grasp holds");
+            plant.advance();
+        });
+    });
+}
+
+fn run(criterion: &mut Criterion) {
+    let scene = Scene::load("cube", &["duration_s=1.0".to_owned()]).expect("the scene is built in");
+    let mut group = criterion.benchmark_group("sim");
+    // Elements are simulated seconds, so that the throughput is the real-time factor.
+    group.throughput(Throughput::Elements(1)).sample_size(20);
+    group.bench_function("cube, 1 s simulated", |bencher| {
+        bencher.iter(|| Simulation::new(&scene).expect("a simulation").run(|_| {}));
+    });
+    group.finish();
+}
+
+criterion_group!(benches, controller, plant, run);
+criterion_main!(benches);

@@ -1,0 +1,12 @@
+//! What the command line can do, a file a command.
+
+pub(crate) mod sim;
+
+/// How a command ended that was not misused.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Outcome {
+    /// It showed what it should: exit code 0.
+    Shown,
+    /// It ran, and failed to show it (the grasp was lost): exit code 1.
+    Failed,
+}

@@ -1,0 +1,136 @@
+//! `blindgrasp sim`: the closed loop on the host.
+
+use super::Outcome;
+use anyhow::Context;
+use blindgrasp::record;
+use blindgrasp::record::run_dir::RunDir;
+use blindgrasp::scene::Scene;
+use blindgrasp::sim::summary::Summary;
+use blindgrasp::sim::{Run, Simulation};
+use clap::Args;
+use indicatif::{ProgressBar, ProgressStyle};
+use std::fmt::Write as _;
+use std::io::{self, Write as _};
+use std::path::PathBuf;
+
+/// Run a scene in simulation: the controller of the firmware against the simulated hand and object
+///
+/// Exit code 0: the grasp held; 1: it was lost; 2: bad input or usage.
+#[derive(Args)]
+pub(crate) struct Arguments {
+    /// A built-in scene (prism, cube, prism-ideal, cube-ideal, cube-normal-only) or the path of a scene file
+    scene: String,
+    /// Write summary, effective scene, trace, plots, pictures and an animation to this directory
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// Overwrite a run in the directory
+    #[arg(long, requires = "out")]
+    force: bool,
+    /// Print the summary as one JSON object
+    #[arg(long)]
+    json: bool,
+    /// Simulated time, s, in place of the scene's
+    #[arg(long, value_name = "S")]
+    duration: Option<f64>,
+    /// Change a value of the scene, such as control.force_n=4 (may be repeated)
+    #[arg(long = "set", value_name = "KEY=VALUE")]
+    settings: Vec<String>,
+}
+
+/// Runs the command.
+pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
+    let mut settings = arguments.settings.clone();
+    settings.extend(arguments.duration.map(|s| format!("duration_s={s:?}")));
+    let scene = Scene::load(&arguments.scene, &settings)?;
+    let directory = match &arguments.out {
+        Some(path) => Some(RunDir::choose(path, arguments.force)?),
+        None => None,
+    };
+    for warning in &scene.warnings {
+        eprintln!("blindgrasp: warning: {warning}");
+    }
+    let simulation = Simulation::new(&scene).with_context(|| format!("scene {}", scene.name))?;
+    let bar = progress_bar(scene.duration_s);
+    let run = simulation.run(|t_s| bar.set_position((t_s * 1e3) as u64));
+    bar.finish_and_clear();
+
+    let text =
+        if arguments.json { serde_json::to_string(&run.summary)? + "\n" } else { describe(&run.summary) };
+    io::stdout().lock().write_all(text.as_bytes()).context("cannot print the summary")?;
+    if let Some(directory) = &directory {
+        write_files(directory, &scene, &run)?;
+        eprintln!("blindgrasp: wrote {}", directory.path().display());
+    }
+    Ok(if run.summary.grasp_held { Outcome::Shown } else { Outcome::Failed })
+}
+
+/// A bar over simulated milliseconds; hidden where stderr is no terminal.
+fn progress_bar(duration_s: f64) -> ProgressBar {
+    let style = "{bar:40} {percent:>3} %  {msg}simulated, {eta} left";
+    ProgressBar::new((duration_s * 1e3) as u64)
+        .with_style(ProgressStyle::with_template(style).unwrap_or_else(|_| ProgressStyle::default_bar()))
+}
+
+fn write_files(directory: &RunDir, scene: &Scene, run: &Run) -> anyhow::Result<()> {
+    directory.create()?;
+    let summary = serde_json::to_string_pretty(&run.summary)? + "\n";
+    directory.write("summary.json", |file| file.write_all(summary.as_bytes()))?;
+    directory.write("scene.toml", |file| file.write_all(scene.effective_toml().as_bytes()))?;
+    directory.write("trace.csv", |file| record::csv::write(file, &run.samples).map_err(io::Error::other))?;
+    Ok(())
+}
+
+/// The summary as a table.
+fn describe(summary: &Summary) -> String {
+    let mut text = String::new();
+    let mut line = |name: &str, value: String| {
+        let _ = writeln!(text, "{name:<22}{value}");
+    };
+    line("scene", summary.scene.clone());
+    line(
+        "simulated",
+        format!(
+            "{:.3} s in {:.2} s ({:.0} x real time)",
+            summary.duration_s, summary.wall_s, summary.real_time_factor
+        ),
+    );
+    line(
+        "grasp",
+        match (summary.lost_at_s, &summary.lost_reason) {
+            (Some(t_s), Some(reason)) => format!("LOST at {t_s:.3} s: {reason}"),
+            _ => "held".to_owned(),
+        },
+    );
+    line(
+        "at rest",
+        match summary.settle_time_s {
+            Some(t_s) => format!("from {t_s:.3} s on"),
+            None => "not yet".to_owned(),
+        },
+    );
+    let last = &summary.last;
+    line("joint speed, max", format!("{:9.2e} rad/s", last.joint_speed_max_rad_s));
+    line("object speed", format!("{:9.2e} m/s", last.object_speed_m_s));
+    line("object spin", format!("{:9.2e} rad/s", last.object_spin_rad_s));
+    line("residual force", format!("{:9.2e} N     (Eq. 38)", last.force_residual_n));
+    line("residual moment", format!("{:9.2e} N m   (Eq. 38)", last.moment_residual_nm));
+    line("friction needed, max", format!("{:9.3}", summary.friction_demand_max));
+    line(
+        "energy",
+        format!(
+            "{:.6} J -> {:.6} J, largest rise {:.1e} J",
+            summary.energy.initial_j, summary.energy.final_j, summary.energy.increase_max_j
+        ),
+    );
+    let row = |values: &[f64], scale: f64| {
+        values.iter().fold(String::new(), |row, value| row + &format!("{:>10.4}", scale * value))
+    };
+    let fingers = (1..=last.normal_force_n.len())
+        .fold(String::new(), |row, i| row + &format!("{:>10}", format!("finger {i}")));
+    line("", fingers);
+    line("normal force, N", row(&last.normal_force_n, 1.0));
+    line("  of Eq. 57, N", row(&last.desired_normal_force_n, 1.0));
+    line("tangential force, N", row(&last.tangential_force_n, 1.0));
+    line("indentation, mm", row(&last.indentation_m, 1e3));
+    text
+}

@@ -1,0 +1,79 @@
+//! The directory that a run is written to.
+
+use std::io::{self, Write};
+use std::path::{Path, PathBuf};
+use std::{fs, fs::File};
+
+/// Why a run can't be written.
+#[derive(Debug, thiserror::Error)]
+pub enum RunDirError {
+    /// The directory has files in it.
+    #[error("{}: not empty; choose another directory, or overwrite a run in it with --force", path.display())]
+    Occupied {
+        /// The directory.
+        path: PathBuf,
+    },
+    /// The file system said no.
+    #[error("{}: {source}; nothing more was written there", path.display())]
+    Io {
+        /// The file or directory.
+        path: PathBuf,
+        /// What it said.
+        source: io::Error,
+    },
+}
+
+/// A directory for one run.
+#[derive(Clone, Debug)]
+pub struct RunDir {
+    path: PathBuf,
+}
+
+impl RunDir {
+    /// Chooses a directory; nothing is written yet. With `force`, files of an earlier run are overwritten, others left.
+    ///
+    /// # Errors
+    /// The directory is not empty (without `force`), or is none.
+    pub fn choose(path: &Path, force: bool) -> Result<Self, RunDirError> {
+        let path = path.to_owned();
+        match fs::read_dir(&path) {
+            Ok(mut entries) => match entries.next() {
+                Some(_) if !force => Err(RunDirError::Occupied { path }),
+                _ => Ok(Self { path }),
+            },
+            Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(Self { path }),
+            Err(source) => Err(RunDirError::Io { path, source }),
+        }
+    }
+
+    /// The directory.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Makes the directory if it is not there.
+    ///
+    /// # Errors
+    /// What the file system says.
+    pub fn create(&self) -> Result<(), RunDirError> {
+        fs::create_dir_all(&self.path).map_err(|source| RunDirError::Io { path: self.path.clone(), source })
+    }
+
+    /// Writes one file.
+    ///
+    /// # Errors
+    /// What the file system says; a full disk among others.
+    pub fn write(
+        &self,
+        name: &str,
+        fill: impl FnOnce(&mut dyn Write) -> io::Result<()>,
+    ) -> Result<(), RunDirError> {
+        let path = self.path.join(name);
+        let written = File::create(&path).and_then(|file| {
+            let mut file = io::BufWriter::new(file);
+            fill(&mut file)?;
+            file.flush()
+        });
+        written.map_err(|source| RunDirError::Io { path, source })
+    }
+}

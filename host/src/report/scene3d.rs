@@ -1,0 +1,173 @@
+//! One moment of a run as triangles: hand, object, contact forces; and the stage that all moments of a run share.
+
+use super::Report;
+use super::camera::{Extent, View};
+use super::mesh::{Mesh, ROUND, THIN};
+use super::palette::Rgb;
+use super::skeleton::{self, Sizes};
+use crate::plant::polyhedron::Polyhedron;
+use crate::record::sample::{ContactSample, Sample};
+use nalgebra::Vector3;
+use std::collections::BTreeSet;
+
+const GLASS: Rgb = [132, 178, 212];
+/// Arrows.
+pub(super) const FORCE: Rgb = [250, 226, 60];
+const EDGE: Rgb = [52, 66, 84];
+
+/// What is the same for all moments of a run: sizes, the scale of the forces, and where to look from.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Stage {
+    sizes: Sizes,
+    /// Length of the arrow of 1 N, m.
+    pub(super) m_per_n: f64,
+    /// Mean distance of the object's corners from its centre of mass, m.
+    object_radius_m: f64,
+    pub(super) view: View,
+    pub(super) extent: Extent,
+    /// Step in depth that shows as an outline, m.
+    pub(super) outline_m: f64,
+}
+
+/// How many moments of a run are looked at to find out how much room it takes.
+const PROBES: usize = 16;
+
+impl Stage {
+    pub(super) fn new(report: &Report<'_>) -> Self {
+        let corners = &report.object.vertices_m;
+        let object_radius_m = match corners.iter().map(Vector3::norm).sum::<f64>() / corners.len() as f64 {
+            radius if radius > 0.0 && radius.is_finite() => radius,
+            _ => 0.05,
+        };
+        let sizes = Sizes::of(report.hand);
+        let mut stage = Self {
+            sizes,
+            m_per_n: reach(report.samples).unwrap_or(0.6 * object_radius_m) / usual_force(report.samples),
+            object_radius_m,
+            view: view(report),
+            extent: Extent::around(std::iter::empty()),
+            outline_m: 0.8 * sizes.link_radius_m,
+        };
+        let probes: Vec<Option<&Sample>> = match report.samples.len() {
+            0 => vec![None],
+            count => (0..PROBES).map(|k| report.samples.get(k * (count - 1) / (PROBES - 1))).collect(),
+        };
+        let meshes: Vec<Mesh> = probes.into_iter().map(|sample| stage.mesh(report, sample)).collect();
+        // An object that was lost flies away; the picture stays with the hand.
+        let first = Cloud::around(&meshes[0]);
+        stage.extent = Extent::around(
+            meshes
+                .iter()
+                .flat_map(Mesh::points)
+                .filter(|point| first.is_near(point))
+                .map(|p| stage.view.flat(p)),
+        );
+        stage
+    }
+
+    /// Hand, object and forces at one sample; the hand alone, its joints at zero, without one.
+    pub(super) fn mesh(&self, report: &Report<'_>, sample: Option<&Sample>) -> Mesh {
+        let mut mesh = Mesh::default();
+        let angles = sample.map_or(&[][..], |sample| &sample.angles_rad);
+        skeleton::add(&mut mesh, report.hand, &skeleton::posture(report.hand, angles), &self.sizes);
+        if let Some(sample) = sample {
+            self.add_object(&mut mesh, report.object, sample);
+            for contact in &sample.contacts {
+                self.add_force(&mut mesh, contact);
+            }
+        }
+        mesh
+    }
+
+    fn add_object(&self, mesh: &mut Mesh, object: &Polyhedron, sample: &Sample) {
+        let place = |corner: &Vector3<f64>| sample.position_m + sample.attitude * corner;
+        let mut edges = BTreeSet::new();
+        for face in &object.faces {
+            let corners: Vec<Vector3<f64>> =
+                face.corners.iter().filter_map(|&k| object.vertices_m.get(k)).map(place).collect();
+            mesh.pane(&corners, sample.attitude * face.normal, GLASS);
+            let next = face.corners.iter().cycle().skip(1);
+            edges.extend(face.corners.iter().zip(next).map(|(&a, &b)| (a.min(b), a.max(b))));
+        }
+        for (a, b) in edges {
+            if let (Some(a), Some(b)) = (object.vertices_m.get(a), object.vertices_m.get(b)) {
+                let radius = 0.011 * self.object_radius_m;
+                mesh.cone([place(a), place(b)], [radius; 2], THIN, EDGE);
+                mesh.sphere(place(a), radius, THIN, EDGE);
+                mesh.sphere(place(b), radius, THIN, EDGE);
+            }
+        }
+    }
+
+    /// The force on the object, an arrow that starts at the contact.
+    fn add_force(&self, mesh: &mut Mesh, contact: &ContactSample) {
+        let force = force_on_object(contact);
+        let length = (force.norm() * self.m_per_n).min(1.3 * self.object_radius_m);
+        if !(length > 0.02 * self.object_radius_m) {
+            return;
+        }
+        let along = force.normalize();
+        let radius = (0.045 * self.object_radius_m).min(0.12 * length);
+        let head = (0.24 * self.object_radius_m).min(0.5 * length);
+        let (tail, tip) = (contact.point_m, contact.point_m + along * length);
+        let mut arrow = Mesh::default();
+        arrow.cone([tail, tip - along * head], [radius; 2], ROUND, FORCE);
+        arrow.cone([tip - along * head, tip], [2.4 * radius, 0.0], ROUND, FORCE);
+        mesh.marks.append(&mut arrow.solid);
+    }
+}
+
+/// `f C_Y - lambda_X C_X - lambda_Z C_Z`, N.
+fn force_on_object(contact: &ContactSample) -> Vector3<f64> {
+    contact.frame * Vector3::new(-contact.lambda_n[0], contact.normal_force_n, -contact.lambda_n[1])
+}
+
+/// A force that most of the run stays below, so that one impact does not shrink all other arrows, N.
+fn usual_force(samples: &[Sample]) -> f64 {
+    let step = samples.len() / 2000 + 1;
+    let mut forces: Vec<f64> = samples
+        .iter()
+        .step_by(step)
+        .flat_map(|sample| &sample.contacts)
+        .map(|contact| force_on_object(contact).norm())
+        .filter(|force| *force > 0.0 && force.is_finite())
+        .collect();
+    forces.sort_by(f64::total_cmp);
+    forces.get(forces.len() * 9 / 10).copied().unwrap_or(1.0)
+}
+
+/// Mean distance of the first contacts from the object's centre of mass, m: room for an arrow.
+fn reach(samples: &[Sample]) -> Option<f64> {
+    let sample = samples.first()?;
+    let reach = sample.contacts.iter().map(|c| (c.point_m - sample.position_m).norm()).sum::<f64>();
+    Some(reach / sample.contacts.len() as f64).filter(|reach| *reach > 0.0 && reach.is_finite())
+}
+
+fn view(report: &Report<'_>) -> View {
+    let angles = report.samples.first().map_or(&[][..], |sample| &sample.angles_rad);
+    let posture = skeleton::posture(report.hand, angles);
+    let tips = &posture.centres_m[..report.hand.fingertip_count()];
+    let object = report.samples.first().map_or_else(|| skeleton::middle(tips), |sample| sample.position_m);
+    let fingers: Vec<Vector3<f64>> = tips.iter().map(|tip| tip - object).collect();
+    View::on_grasp(&fingers, &(object - skeleton::palm_centre(report.hand, &posture)))
+}
+
+/// Where the points of a mesh are, roughly.
+struct Cloud {
+    centre: Vector3<f64>,
+    radius: f64,
+}
+
+impl Cloud {
+    fn around(mesh: &Mesh) -> Self {
+        let finite = |point: &&Vector3<f64>| point.iter().all(|v| v.is_finite());
+        let points: Vec<Vector3<f64>> = mesh.points().filter(finite).copied().collect();
+        let centre = skeleton::middle(&points);
+        let radius = points.iter().map(|point| (point - centre).norm()).fold(0.0, f64::max);
+        Self { centre, radius }
+    }
+
+    fn is_near(&self, point: &Vector3<f64>) -> bool {
+        (point - self.centre).norm() <= 1.5 * self.radius
+    }
+}

@@ -1,0 +1,116 @@
+//! From the effective configuration to a [`Scene`]: every number checked, everything prepared.
+
+use super::{
+    Scene,
+    check::{Result, all_within, fail, name, within},
+    file::{SCHEMA, SceneFile},
+    hand::{fingertip_parameters, hand, joint_parameters, moving_masses, overlaps},
+    object::object,
+    start::{attitude, start},
+};
+use nalgebra::Vector3;
+
+/// Longer runs are likely mistakes, s.
+const LONGEST_RUN_S: f64 = 3600.0;
+
+/// Checks a configuration and prepares the scene.
+pub(super) fn scene(file: SceneFile) -> Result<Scene> {
+    let mut warnings = Vec::new();
+    for (key, word) in
+        [("name", &file.name), ("hand.name", &file.hand.name), ("object.name", &file.object.name)]
+    {
+        name(key, word)?;
+    }
+    let substeps = settings(&file)?;
+    let hand = hand(&file.hand, &mut warnings)?;
+    let object = object(&file.object, &mut warnings)?;
+    let attitude = attitude(&file.pose)?;
+    all_within("pose.position_m", &file.pose.position_m, 100.0)?;
+    let position_m = Vector3::from(file.pose.position_m);
+
+    let count = file.hand.fingertips.len();
+    if file.contacts.len() != count {
+        return fail(
+            "contact",
+            format!("{} contacts for {count} fingertips", file.contacts.len()),
+            "give one [[contact]] for each fingertip, in the hand's order",
+        );
+    }
+    let (contacts, start) = start(&file, &hand, &object.shape, position_m, attitude)?;
+    moving_masses(&file.hand, &hand, &start.angles_rad)?;
+    overlaps(&file.hand, &hand, &start.angles_rad, &mut warnings);
+
+    Ok(Scene {
+        name: file.name.clone(),
+        description: file.description.clone(),
+        duration_s: file.duration_s,
+        seed: file.seed,
+        hand,
+        joints: file.hand.joints.iter().map(|joint| joint_parameters(joint, &file)).collect(),
+        fingertips: file.hand.fingertips.iter().map(fingertip_parameters).collect(),
+        object: object.shape,
+        object_name: file.object.name.clone(),
+        mass_kg: object.mass_kg,
+        inertia_kg_m2: object.inertia_kg_m2,
+        contacts,
+        start,
+        control: file.control.clone(),
+        sensors: file.sensors.clone(),
+        actuators: file.actuators.clone(),
+        friction: file.friction.clone(),
+        plant: file.plant.clone(),
+        substeps,
+        warnings,
+        file,
+    })
+}
+
+/// Everything that is a plain number. Returns the number of sub-steps in a control period.
+fn settings(file: &SceneFile) -> Result<usize> {
+    for (key, schema) in
+        [("schema", file.schema), ("hand.schema", file.hand.schema), ("object.schema", file.object.schema)]
+    {
+        if schema != SCHEMA {
+            return fail(
+                key,
+                format!("{schema} is a format that this program does not know"),
+                format!("write it as format {SCHEMA}"),
+            );
+        }
+    }
+    let control = &file.control;
+    within("control.period_s", control.period_s, 1e-5, 0.1)?;
+    within("duration_s", file.duration_s, control.period_s, LONGEST_RUN_S)?;
+    within("control.force_n", control.force_n, 1e-6, 1e4)?;
+    within("control.attitude_stiffness_nm", control.attitude_stiffness_nm, 0.0, 1e4)?;
+    within("control.damping_scale", control.damping_scale, 0.0, 1e4)?;
+    within("control.soft_start_s", control.soft_start_s, 0.0, LONGEST_RUN_S)?;
+    within("control.estimator_bandwidth_hz", control.estimator_bandwidth_hz, 0.1, 0.5 / control.period_s)?;
+    within("sensors.noise_counts", file.sensors.noise_counts, 0.0, 1e6)?;
+    if file.actuators.output_delay_ticks > 1 {
+        return fail(
+            "actuators.output_delay_ticks",
+            format!("{} is not modelled", file.actuators.output_delay_ticks),
+            "has to be 0 or 1",
+        );
+    }
+    if let Some(slew) = file.actuators.slew_limit_nm_s {
+        within("actuators.slew_limit_nm_s", slew, 1e-6, 1e9)?;
+    }
+    within("friction.scale", file.friction.scale, 0.0, 1e4)?;
+    all_within("plant.gravity_m_s2", &file.plant.gravity_m_s2, 1000.0)?;
+    within("plant.substep_s", file.plant.substep_s, 1e-7, control.period_s)?;
+    let ratio = control.period_s / file.plant.substep_s;
+    let substeps = ratio.round();
+    if !((ratio - substeps).abs() < 1e-6 * ratio) {
+        return fail(
+            "plant.substep_s",
+            format!(
+                "{} s does not divide the sampling period of {} s",
+                file.plant.substep_s, control.period_s
+            ),
+            format!("{:e} does", control.period_s / ratio.ceil()),
+        );
+    }
+    Ok(substeps as usize)
+}

@@ -1,0 +1,121 @@
+//! The object of a scene: its shape, mass and inertia.
+
+use super::{
+    check::{Result, all_within, fail, within},
+    error::SceneError,
+    file::{InertiaFile, ObjectFile, ShapeFile},
+};
+use crate::plant::polyhedron::{Polyhedron, PolyhedronError};
+use nalgebra::{Matrix3, SymmetricEigen, Vector3};
+
+/// An object, checked.
+pub(super) struct Body {
+    pub(super) shape: Polyhedron,
+    pub(super) mass_kg: f64,
+    pub(super) inertia_kg_m2: Matrix3<f64>,
+}
+
+/// The polyhedron of a shape.
+fn polyhedron(shape: &ShapeFile) -> std::result::Result<Polyhedron, PolyhedronError> {
+    match shape {
+        ShapeFile::Box { size_m } => Polyhedron::cuboid(*size_m),
+        ShapeFile::Prism { sides, side_m, height_m } => {
+            Polyhedron::regular_prism(*sides as usize, *side_m, *height_m)
+        }
+        ShapeFile::PolygonPrism { corners_m, height_m } => Polyhedron::prism(corners_m, *height_m),
+        ShapeFile::Hull { points_m } => {
+            let points: Vec<Vector3<f64>> = points_m.iter().map(|&point| point.into()).collect();
+            Polyhedron::hull(&points)
+        }
+    }
+}
+
+/// Checks an object and computes its mass and inertia.
+pub(super) fn object(file: &ObjectFile, warnings: &mut Vec<String>) -> Result<Body> {
+    let shape = polyhedron(&file.shape).map_err(|error| {
+        let key = match file.shape {
+            ShapeFile::Box { .. } => "object.shape.box.size_m",
+            ShapeFile::Prism { .. } => "object.shape.prism",
+            ShapeFile::PolygonPrism { .. } => "object.shape.polygon_prism",
+            ShapeFile::Hull { .. } => "object.shape.hull.points_m",
+        };
+        SceneError::new(key, error.to_string(), "describe a convex body in metres")
+    })?;
+    let radius = shape.radius_m();
+    if !(1e-4..=10.0).contains(&radius) {
+        return fail(
+            "object.shape",
+            format!("reaches {radius:.3e} m from its centre of mass"),
+            "give lengths in metres, between 0.1 mm and 10 m",
+        );
+    }
+    let uniform = shape.mass_properties();
+    let mass_kg = match (file.mass_kg, file.density_kg_m3) {
+        (Some(mass), None) => mass,
+        (None, Some(density)) => {
+            within("object.density_kg_m3", density, 1e-3, 1e5)?;
+            density * uniform.volume_m3
+        }
+        (Some(_), Some(_)) => {
+            return fail("object.density_kg_m3", "mass and density are both given", "leave one out");
+        }
+        (None, None) => {
+            return fail("object.mass_kg", "neither mass nor density is given", "add `mass_kg = ...`");
+        }
+    };
+    within("object.mass_kg", mass_kg, 1e-9, 1e4)?;
+    let inertia_kg_m2 = match &file.inertia_kg_m2 {
+        None => uniform.inertia_per_kg_m2 * mass_kg,
+        Some(inertia) => {
+            let inertia = tensor("object.inertia_kg_m2", inertia)?;
+            let moments = SymmetricEigen::new(inertia).eigenvalues;
+            if !(moments.min() > 1e-9 * moments.max()) {
+                return fail(
+                    "object.inertia_kg_m2",
+                    "is not positive definite",
+                    "give the inertia about the centre of mass as [xx, yy, zz, xy, xz, yz], or leave it out",
+                );
+            }
+            if breaks_triangle(&inertia) {
+                warnings.push(format!(
+                    "object `{}`: its inertia is that of no body: one moment is larger than the sum of the two others",
+                    file.name
+                ));
+            }
+            if moments.max() > mass_kg * radius * radius {
+                warnings.push(format!(
+                    "object `{}`: its inertia needs mass outside of it: {:.3e} kg m^2, but {mass_kg} kg within \
+                     {radius:.3} m make {:.3e} kg m^2 at most",
+                    file.name,
+                    moments.max(),
+                    mass_kg * radius * radius,
+                ));
+            }
+            inertia
+        }
+    };
+    Ok(Body { shape, mass_kg, inertia_kg_m2 })
+}
+
+/// A symmetric tensor from the three or six numbers of a file.
+pub(super) fn tensor(key: &str, file: &InertiaFile) -> Result<Matrix3<f64>> {
+    all_within(key, &file.0, 1e6)?;
+    let (xx, yy, zz, xy, xz, yz) = match file.0[..] {
+        [xx, yy, zz] => (xx, yy, zz, 0.0, 0.0, 0.0),
+        [xx, yy, zz, xy, xz, yz] => (xx, yy, zz, xy, xz, yz),
+        _ => {
+            return fail(
+                key,
+                format!("has {} items", file.0.len()),
+                "has to be [xx, yy, zz] or [xx, yy, zz, xy, xz, yz]",
+            );
+        }
+    };
+    Ok(Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz))
+}
+
+/// Whether a principal moment is larger than the sum of the two others.
+pub(super) fn breaks_triangle(inertia: &Matrix3<f64>) -> bool {
+    let moments = SymmetricEigen::new(*inertia).eigenvalues;
+    2.0 * moments.max() > moments.sum() * (1.0 + 1e-6)
+}

@@ -1,0 +1,356 @@
+//! What the joints may be asked for: soft end stops, torque limits, slew limits, in this order.
+//!
+//! - A **soft end stop** acts in a margin before each end of the joint's range. Towards the end it fades out the torque
+//!   that pushes there, to nothing at the end itself; a spring pushes back with the depth, and a damper, which fades in
+//!   over the margin, brakes motion towards the end. Torque and motion away from the end are left alone.
+//! - The **torque limit** cuts the torque to what the joint bears.
+//! - The **slew limit** bounds how fast the torque changes, so that nothing jumps. It comes last; since it moves from
+//!   the last torque towards one within the torque limit, its result is within the torque limit too.
+//!
+//! Each can be left out, and each says where it acted ([`Limiting`]). Limits are no faults: a hand that is limited does
+//! what it can.
+
+use crate::control::ControlError;
+use crate::hand::Hand;
+use crate::math::Real;
+use crate::period::Period;
+use core::fmt;
+use serde::{Deserialize, Serialize};
+
+/// A reason why a joint's torque is not what the law asked for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u8)]
+pub enum Limit {
+    /// The torque limit.
+    Torque = 1,
+    /// The slew limit.
+    Slew = 1 << 1,
+    /// The soft stop before the lower end of the range.
+    LowerStop = 1 << 2,
+    /// The soft stop before the upper end of the range.
+    UpperStop = 1 << 3,
+}
+
+impl Limit {
+    /// Every reason.
+    pub const ALL: [Self; 4] = [Self::Torque, Self::Slew, Self::LowerStop, Self::UpperStop];
+
+    /// The reason in words.
+    pub const fn words(self) -> &'static str {
+        match self {
+            Self::Torque => "torque limit",
+            Self::Slew => "slew limit",
+            Self::LowerStop => "lower end stop",
+            Self::UpperStop => "upper end stop",
+        }
+    }
+}
+
+/// The reasons that limit one joint: a bit each.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Limiting(u8);
+
+impl Limiting {
+    /// Nothing limits.
+    pub const NONE: Self = Self(0);
+
+    /// Adds a reason.
+    pub fn insert(&mut self, limit: Limit) {
+        self.0 |= limit as u8;
+    }
+
+    /// Whether a reason is among them.
+    pub const fn contains(self, limit: Limit) -> bool {
+        self.0 & limit as u8 != 0
+    }
+
+    /// Whether nothing limits.
+    pub const fn is_empty(self) -> bool {
+        self.0 == 0
+    }
+
+    /// The bits, as they go over the wire.
+    pub const fn bits(self) -> u8 {
+        self.0
+    }
+
+    /// The reasons.
+    pub fn iter(self) -> impl Iterator<Item = Limit> {
+        Limit::ALL.into_iter().filter(move |&limit| self.contains(limit))
+    }
+}
+
+impl fmt::Display for Limiting {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if self.is_empty() {
+            return write!(f, "nothing");
+        }
+        for (k, limit) in self.iter().enumerate() {
+            write!(f, "{}{}", if k == 0 { "" } else { ", " }, limit.words())?;
+        }
+        Ok(())
+    }
+}
+
+/// Limits, as a user gives them; `None` leaves one out.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LimitConfig<T, const J: usize> {
+    /// Largest torque of each joint, N m.
+    pub torque_nm: Option<[T; J]>,
+    /// Largest change of each joint's torque, N m/s.
+    pub slew_nm_s: Option<[T; J]>,
+    /// Soft end stops.
+    pub stops: Option<StopConfig<T, J>>,
+}
+
+impl<T: Real, const J: usize> LimitConfig<T, J> {
+    /// No limits.
+    pub const NONE: Self = Self { torque_nm: None, slew_nm_s: None, stops: None };
+}
+
+/// Soft end stops, as a user gives them.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct StopConfig<T, const J: usize> {
+    /// How far before the end of the joint's range the stop begins to act, rad; at most half the range.
+    pub margin_rad: [T; J],
+    /// Torque that pushes back, by depth into the margin, N m/rad.
+    pub stiffness_nm_rad: [T; J],
+    /// Torque that brakes motion towards the end, once the margin is used up, N m s/rad.
+    pub damping_nm_s: [T; J],
+}
+
+/// The limits, prepared for the joints of one hand.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Limits<T, const J: usize> {
+    joint_count: usize,
+    joints: [JointLimits<T>; J],
+}
+
+/// The limits of one joint.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct JointLimits<T> {
+    torque_nm: Option<T>,
+    /// Largest change of the torque in a tick, N m.
+    slew_nm: Option<T>,
+    stop: Option<Stop<T>>,
+}
+
+/// The soft end stops of one joint.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Stop<T> {
+    /// Where the lower margin begins, rad.
+    lower_rad: T,
+    /// Where the upper margin begins, rad.
+    upper_rad: T,
+    /// One over the margin, 1/rad.
+    per_margin: T,
+    stiffness_nm_rad: T,
+    damping_nm_s: T,
+}
+
+impl<T: Real, const J: usize> LimitConfig<T, J> {
+    /// Checks the limits and prepares them for a hand.
+    ///
+    /// # Errors
+    /// The first limit that is out of its range.
+    pub fn prepare<const F: usize>(
+        &self,
+        hand: &Hand<T, J, F>,
+        period: Period,
+    ) -> Result<Limits<T, J>, ControlError> {
+        let joint_count = hand.joint_count().min(J);
+        let mut joints = [JointLimits { torque_nm: None, slew_nm: None, stop: None }; J];
+        for (k, joint) in joints.iter_mut().enumerate().take(joint_count) {
+            let fail = |parameter, reason| Err(ControlError { parameter, joint: Some(k), reason });
+            if let Some(torque_nm) = self.torque_nm {
+                if !is_positive(torque_nm[k]) {
+                    return fail("limits.torque_nm", "has to be positive");
+                }
+                joint.torque_nm = Some(torque_nm[k]);
+            }
+            if let Some(slew_nm_s) = self.slew_nm_s {
+                if !is_positive(slew_nm_s[k]) {
+                    return fail("limits.slew_nm_s", "has to be positive");
+                }
+                joint.slew_nm = Some(slew_nm_s[k] * period.seconds());
+            }
+            if let Some(stops) = &self.stops {
+                joint.stop = Some(stops.prepare(k, hand.range_rad(k))?);
+            }
+        }
+        Ok(Limits { joint_count, joints })
+    }
+}
+
+impl<T: Real, const J: usize> StopConfig<T, J> {
+    fn prepare(&self, joint: usize, range_rad: (T, T)) -> Result<Stop<T>, ControlError> {
+        let fail = |parameter, reason| Err(ControlError { parameter, joint: Some(joint), reason });
+        let (lower, upper) = range_rad;
+        let margin = self.margin_rad[joint];
+        if !(is_positive(margin) && margin + margin <= upper - lower) {
+            return fail("limits.stops.margin_rad", "has to be positive and at most half the joint's range");
+        }
+        let (stiffness_nm_rad, damping_nm_s) = (self.stiffness_nm_rad[joint], self.damping_nm_s[joint]);
+        if !(stiffness_nm_rad >= T::zero() && stiffness_nm_rad.is_finite()) {
+            return fail("limits.stops.stiffness_nm_rad", "has to be zero or positive");
+        }
+        if !(damping_nm_s >= T::zero() && damping_nm_s.is_finite()) {
+            return fail("limits.stops.damping_nm_s", "has to be zero or positive");
+        }
+        Ok(Stop {
+            lower_rad: lower + margin,
+            upper_rad: upper - margin,
+            per_margin: T::one() / margin,
+            stiffness_nm_rad,
+            damping_nm_s,
+        })
+    }
+}
+
+fn is_positive<T: Real>(v: T) -> bool {
+    v > T::zero() && v.is_finite()
+}
+
+impl<T: Real, const J: usize> Limits<T, J> {
+    /// Takes the wanted torques to the allowed ones, N m, and says what limited each joint.
+    pub fn apply(
+        &self,
+        angles_rad: &[T; J],
+        speeds_rad_s: &[T; J],
+        last_nm: &[T; J],
+        wanted_nm: &[T; J],
+    ) -> ([T; J], [Limiting; J]) {
+        let mut torques = [T::zero(); J];
+        let mut limiting = [Limiting::NONE; J];
+        for k in 0..self.joint_count.min(J) {
+            (torques[k], limiting[k]) =
+                self.joints[k].apply(angles_rad[k], speeds_rad_s[k], last_nm[k], wanted_nm[k]);
+        }
+        (torques, limiting)
+    }
+}
+
+impl<T: Real> JointLimits<T> {
+    fn apply(&self, angle_rad: T, speed_rad_s: T, last_nm: T, wanted_nm: T) -> (T, Limiting) {
+        let mut torque = wanted_nm;
+        let mut limiting = Limiting::NONE;
+        if let Some(stop) = &self.stop {
+            // The lower stop is the upper one in a mirror.
+            let (into_upper, into_lower) = (angle_rad - stop.upper_rad, stop.lower_rad - angle_rad);
+            if into_upper > T::zero() {
+                torque = stop.hold_back(into_upper, speed_rad_s, torque);
+                limiting.insert(Limit::UpperStop);
+            } else if into_lower > T::zero() {
+                torque = -stop.hold_back(into_lower, -speed_rad_s, -torque);
+                limiting.insert(Limit::LowerStop);
+            }
+        }
+        if let Some(limit) = self.torque_nm
+            && torque.magnitude() > limit
+        {
+            torque = torque.limited(-limit, limit);
+            limiting.insert(Limit::Torque);
+        }
+        if let Some(step) = self.slew_nm
+            && (torque - last_nm).magnitude() > step
+        {
+            torque = last_nm + (torque - last_nm).limited(-step, step);
+            limiting.insert(Limit::Slew);
+        }
+        (torque, limiting)
+    }
+}
+
+impl<T: Real> Stop<T> {
+    /// The torque at a depth into the margin; positive torque and speed are towards the end.
+    fn hold_back(&self, depth_rad: T, speed_rad_s: T, torque_nm: T) -> T {
+        let share = (depth_rad * self.per_margin).limited(T::zero(), T::one());
+        let mut torque = torque_nm;
+        if torque > T::zero() {
+            torque *= T::one() - share;
+        }
+        if speed_rad_s > T::zero() {
+            torque -= share * self.damping_nm_s * speed_rad_s;
+        }
+        torque - self.stiffness_nm_rad * depth_rad
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::string::ToString;
+
+    /// Range -1 to 1 rad, margin 0.1 rad.
+    fn joint(torque_nm: Option<f64>, slew_nm: Option<f64>, stops: bool) -> JointLimits<f64> {
+        let stop = StopConfig { margin_rad: [0.1], stiffness_nm_rad: [2.0], damping_nm_s: [0.5] };
+        let stop = stops.then(|| stop.prepare(0, (-1.0, 1.0)).unwrap());
+        JointLimits { torque_nm, slew_nm, stop }
+    }
+
+    #[track_caller]
+    fn check(result: (f64, Limiting), torque: f64, words: &str) {
+        assert!((result.0 - torque).abs() < 1e-12, "{} instead of {torque}", result.0);
+        assert_eq!(result.1.to_string(), words);
+    }
+
+    #[test]
+    fn nothing_limits_when_nothing_is_set() {
+        check(joint(None, None, false).apply(5.0, -7.0, 0.0, 1e9), 1e9, "nothing");
+    }
+
+    #[test]
+    fn torque_is_limited_both_ways() {
+        let joint = joint(Some(1.0), None, false);
+        check(joint.apply(0.0, 0.0, 0.0, 1.0), 1.0, "nothing");
+        check(joint.apply(0.0, 0.0, 0.0, 1.5), 1.0, "torque limit");
+        check(joint.apply(0.0, 0.0, 0.0, -1.5), -1.0, "torque limit");
+    }
+
+    #[test]
+    fn slew_is_limited_both_ways() {
+        let joint = joint(None, Some(0.25), false);
+        check(joint.apply(0.0, 0.0, 0.5, 0.75), 0.75, "nothing");
+        check(joint.apply(0.0, 0.0, 0.5, 2.0), 0.75, "slew limit");
+        check(joint.apply(0.0, 0.0, 0.5, -2.0), 0.25, "slew limit");
+    }
+
+    #[test]
+    fn end_stops_push_back_and_fade_out_what_pushes_there() {
+        let joint = joint(None, None, true);
+        check(joint.apply(0.9, 3.0, 0.0, 1.0), 1.0, "nothing");
+        // Half-way into the margin: half the torque, 0.05 rad of the spring, half the damper.
+        check(joint.apply(0.95, 0.0, 0.0, 1.0), 0.5 - 0.1, "upper end stop");
+        check(joint.apply(0.95, 2.0, 0.0, 1.0), 0.5 - 0.1 - 0.5, "upper end stop");
+        check(joint.apply(0.95, -2.0, 0.0, -1.0), -1.0 - 0.1, "upper end stop");
+        check(joint.apply(-0.95, -2.0, 0.0, -1.0), -0.5 + 0.1 + 0.5, "lower end stop");
+        check(joint.apply(-0.95, 2.0, 0.0, 1.0), 1.0 + 0.1, "lower end stop");
+        // At the end and beyond it nothing is left of the torque, and the spring grows.
+        check(joint.apply(1.0, 0.0, 0.0, 1.0), -0.2, "upper end stop");
+        check(joint.apply(1.5, 0.0, 0.0, 1.0), -1.2, "upper end stop");
+    }
+
+    #[test]
+    fn end_stops_begin_without_a_jump() {
+        let joint = joint(None, None, true);
+        let (outside, inside) = (joint.apply(0.9, 5.0, 0.0, 1.0).0, joint.apply(0.9 + 1e-9, 5.0, 0.0, 1.0).0);
+        assert!((outside - inside).abs() < 1e-7);
+    }
+
+    #[test]
+    fn several_reasons_are_all_told() {
+        let joint = joint(Some(1.0), Some(0.25), true);
+        check(joint.apply(1.5, 9.0, 0.0, 1.0), -0.25, "torque limit, slew limit, upper end stop");
+    }
+
+    #[test]
+    fn what_is_not_a_number_is_not_hidden() {
+        let (torque, _) = joint(Some(1.0), Some(0.25), true).apply(0.95, 1.0, 0.0, f64::NAN);
+        assert!(torque.is_nan());
+    }
+
+    #[test]
+    fn bits_are_stable() {
+        assert_eq!(Limit::ALL.map(|limit| limit as u8), [1, 2, 4, 8]);
+    }
+}

@@ -1,0 +1,481 @@
+//! The modes of the hand, and what takes it from one to the next.
+//!
+//! - **Disarmed**: no torque. The hand starts here.
+//! - **Armed**: the joints are damped and their weight is held.
+//! - **Grasping**: the grasp law. The fingertips' attitudes are latched in the first tick; the force `f_d` grows from
+//!   nothing over the soft start, the attitudes are held at full stiffness at once.
+//! - **Releasing**: force and attitude stiffness fall in proportion to zero over the release time; then armed.
+//! - **Fault**: no torque, until the fault is cleared.
+//!
+//! Where no torque is allowed there is none in the tick that enters the mode: no slew limit delays it.
+//!
+//! | in \ event    | Arm       | Disarm     | Grasp      | Release      | Stop     | ClearFault | *fault* | *released* |
+//! |---------------|-----------|------------|------------|--------------|----------|------------|---------|------------|
+//! | **Disarmed**  | Armed     | Disarmed   | NotArmed!  | NotGrasping! | Disarmed | NoFault!   | Fault   | Disarmed   |
+//! | **Armed**     | Armed     | Disarmed   | Grasping   | NotGrasping! | Disarmed | NoFault!   | Fault   | Armed      |
+//! | **Grasping**  | Grasping! | Grasping!  | Grasping   | Releasing    | Disarmed | NoFault!   | Fault   | Grasping   |
+//! | **Releasing** | Releasing!| Releasing! | Releasing! | Releasing    | Disarmed | NoFault!   | Fault   | Armed      |
+//! | **Fault**     | InFault!  | InFault!   | InFault!   | InFault!     | Fault    | Disarmed   | Fault   | Fault      |
+//!
+//! With `!`: refused, for this reason. A command that asks for what already is, is done and changes nothing; a grasp is
+//! not latched anew. `Stop` is done in every mode; it does not hide a fault. `ClearFault` is refused (`FaultPersists`)
+//! while the cause is there.
+//!
+//! In a tick, a fault that is there comes first, then the command, then the end of a release.
+
+use crate::command::{Answer, Command, Refusal};
+use crate::control::ControlError;
+use crate::fault::Raised;
+use crate::math::Real;
+use crate::period::Period;
+use serde::{Deserialize, Serialize};
+
+/// A mode.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Mode {
+    /// No torque.
+    Disarmed,
+    /// The joints are damped and their weight is held.
+    Armed,
+    /// The grasp law is at work.
+    Grasping,
+    /// The grasp is let go.
+    Releasing,
+    /// No torque, because something is wrong.
+    Fault,
+}
+
+impl Mode {
+    /// Every mode.
+    pub const ALL: [Self; 5] = [Self::Disarmed, Self::Armed, Self::Grasping, Self::Releasing, Self::Fault];
+
+    /// Its name in words.
+    pub const fn words(self) -> &'static str {
+        match self {
+            Self::Disarmed => "disarmed",
+            Self::Armed => "armed",
+            Self::Grasping => "grasping",
+            Self::Releasing => "releasing",
+            Self::Fault => "fault",
+        }
+    }
+}
+
+/// What may happen in a mode: the commands, and what the tick itself notices.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Event {
+    /// A command.
+    Command(Command),
+    /// A fault is there.
+    Fault,
+    /// The release time is over.
+    Released,
+}
+
+/// What an event leads to.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Outcome {
+    /// The mode after it, which may be the one before.
+    Enter(Mode),
+    /// The mode stays, and the command is refused.
+    Refuse(Refusal),
+}
+
+/// The table of the module's essay: a row a mode, a column an event.
+#[rustfmt::skip]
+const TABLE: [[Outcome; 8]; 5] = {
+    use Mode::{Armed, Disarmed, Fault, Grasping, Releasing};
+    use Outcome::{Enter, Refuse};
+    use Refusal as R;
+    [
+        // Arm                  Disarm                Grasp                 Release                 Stop             ClearFault          fault         released
+        [Enter(Armed),         Enter(Disarmed),      Refuse(R::NotArmed),  Refuse(R::NotGrasping), Enter(Disarmed), Refuse(R::NoFault), Enter(Fault), Enter(Disarmed)],
+        [Enter(Armed),         Enter(Disarmed),      Enter(Grasping),      Refuse(R::NotGrasping), Enter(Disarmed), Refuse(R::NoFault), Enter(Fault), Enter(Armed)],
+        [Refuse(R::Grasping),  Refuse(R::Grasping),  Enter(Grasping),      Enter(Releasing),       Enter(Disarmed), Refuse(R::NoFault), Enter(Fault), Enter(Grasping)],
+        [Refuse(R::Releasing), Refuse(R::Releasing), Refuse(R::Releasing), Enter(Releasing),       Enter(Disarmed), Refuse(R::NoFault), Enter(Fault), Enter(Armed)],
+        [Refuse(R::InFault),   Refuse(R::InFault),   Refuse(R::InFault),   Refuse(R::InFault),     Enter(Fault),    Enter(Disarmed),    Enter(Fault), Enter(Fault)],
+    ]
+};
+
+/// What an event leads to in a mode.
+pub fn outcome(mode: Mode, event: Event) -> Outcome {
+    let column = match event {
+        Event::Command(command) => command as usize,
+        Event::Fault => 6,
+        Event::Released => 7,
+    };
+    // The table covers everything; were it ever to miss something, the safe side is without torque.
+    TABLE.get(mode as usize).and_then(|row| row.get(column)).copied().unwrap_or(Outcome::Enter(Mode::Fault))
+}
+
+/// Times, as a user gives them.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct SupervisorConfig {
+    /// Time over which the force grows, ms.
+    pub soft_start_ms: u32,
+    /// Time over which force and attitude stiffness fall to zero, ms.
+    pub release_ms: u32,
+}
+
+impl SupervisorConfig {
+    /// Checks the times and prepares them.
+    ///
+    /// # Errors
+    /// A time above an hour.
+    pub fn prepare<T: Real>(&self, period: Period) -> Result<Ramps<T>, ControlError> {
+        Ok(Ramps {
+            soft_start: Ramp::new(period.ticks(self.soft_start_ms, "supervisor.soft_start_ms")?),
+            release: Ramp::new(period.ticks(self.release_ms, "supervisor.release_ms")?),
+        })
+    }
+}
+
+/// The ramps of force and stiffness, prepared.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Ramps<T> {
+    soft_start: Ramp<T>,
+    release: Ramp<T>,
+}
+
+/// A share that grows by the tick from nothing to one.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Ramp<T> {
+    ticks: u32,
+    per_tick: T,
+}
+
+impl<T: Real> Ramp<T> {
+    fn new(ticks: u32) -> Self {
+        let whole = i32::try_from(ticks.max(1)).unwrap_or(i32::MAX);
+        Self { ticks, per_tick: T::one() / T::from_i32(whole) }
+    }
+
+    /// The share in the tick after `age` others; the last tick of the ramp has exactly one.
+    fn share(&self, age: u32) -> T {
+        let tick = age.saturating_add(1);
+        if tick >= self.ticks {
+            return T::one();
+        }
+        T::from_i32(i32::try_from(tick).unwrap_or(i32::MAX)) * self.per_tick
+    }
+}
+
+/// What the joints are driven by in a tick.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Drive<T> {
+    /// Nothing: no torque.
+    Off,
+    /// Damping, and what holds the weight.
+    Hold,
+    /// The grasp law.
+    Grip {
+        /// Share of `f_d`.
+        force_share: T,
+        /// Share of `K_st`.
+        attitude_share: T,
+    },
+}
+
+/// The mode and how long it has lasted.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Supervisor {
+    mode: Mode,
+    fault: Option<Raised>,
+    /// Ticks in this mode before this one.
+    age: u32,
+    /// How far the soft start had come when the release began, in ticks of grasping.
+    grasped: u32,
+}
+
+impl Supervisor {
+    /// Disarmed, without a fault.
+    pub const fn new() -> Self {
+        Self { mode: Mode::Disarmed, fault: None, age: 0, grasped: 0 }
+    }
+
+    /// The mode.
+    pub const fn mode(&self) -> Mode {
+        self.mode
+    }
+
+    /// The fault that led to the mode [`Mode::Fault`].
+    pub const fn fault(&self) -> Option<Raised> {
+        self.fault
+    }
+
+    /// Begins a tick: `fault` is one that is there now. Answers the command.
+    pub fn begin<T: Real>(
+        &mut self,
+        ramps: &Ramps<T>,
+        fault: Option<Raised>,
+        command: Option<Command>,
+    ) -> Option<Answer> {
+        self.age = self.age.saturating_add(1);
+        if let Some(raised) = fault {
+            self.raise(raised);
+        }
+        let answer = command.map(|command| Answer { command, refused: self.obey(command, fault) });
+        if self.mode == Mode::Releasing && self.age >= ramps.release.ticks {
+            self.take(Event::Released);
+        }
+        answer
+    }
+
+    /// Enters the mode [`Mode::Fault`]; the fault that came first is kept.
+    pub fn raise(&mut self, raised: Raised) {
+        self.take(Event::Fault);
+        self.fault = self.fault.or(Some(raised));
+    }
+
+    /// What drives the joints in this tick.
+    pub fn drive<T: Real>(&self, ramps: &Ramps<T>) -> Drive<T> {
+        match self.mode {
+            Mode::Disarmed | Mode::Fault => Drive::Off,
+            Mode::Armed => Drive::Hold,
+            Mode::Grasping => {
+                Drive::Grip { force_share: ramps.soft_start.share(self.age), attitude_share: T::one() }
+            }
+            Mode::Releasing => {
+                let left = T::one() - ramps.release.share(self.age);
+                Drive::Grip { force_share: ramps.soft_start.share(self.grasped) * left, attitude_share: left }
+            }
+        }
+    }
+
+    fn obey(&mut self, command: Command, fault: Option<Raised>) -> Option<Refusal> {
+        if command == Command::ClearFault && fault.is_some() {
+            return Some(Refusal::FaultPersists);
+        }
+        self.take(Event::Command(command))
+    }
+
+    fn take(&mut self, event: Event) -> Option<Refusal> {
+        match outcome(self.mode, event) {
+            Outcome::Refuse(refusal) => return Some(refusal),
+            Outcome::Enter(mode) if mode == self.mode => {}
+            Outcome::Enter(mode) => {
+                if mode == Mode::Releasing {
+                    self.grasped = self.age.saturating_sub(1);
+                }
+                if self.mode == Mode::Fault {
+                    self.fault = None;
+                }
+                self.mode = mode;
+                self.age = 0;
+            }
+        }
+        None
+    }
+}
+
+impl Default for Supervisor {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::fault::Fault;
+    use std::format;
+    use std::vec::Vec;
+
+    const RAISED: Raised = Raised { fault: Fault::Overspeed, joint: 2 };
+
+    fn ramps(soft_start_ms: u32, release_ms: u32) -> Ramps<f64> {
+        SupervisorConfig { soft_start_ms, release_ms }.prepare(Period::from_us(1000).unwrap()).unwrap()
+    }
+
+    /// A supervisor that was led into a mode.
+    fn in_mode(mode: Mode, ramps: &Ramps<f64>) -> Supervisor {
+        let mut supervisor = Supervisor::new();
+        let commands: &[Command] = match mode {
+            Mode::Disarmed | Mode::Fault => &[],
+            Mode::Armed => &[Command::Arm],
+            Mode::Grasping => &[Command::Arm, Command::Grasp],
+            Mode::Releasing => &[Command::Arm, Command::Grasp, Command::Release],
+        };
+        for &command in commands {
+            let answer = supervisor.begin(ramps, None, Some(command));
+            assert_eq!(answer, Some(Answer { command, refused: None }));
+        }
+        if mode == Mode::Fault {
+            supervisor.begin(ramps, Some(RAISED), None);
+        }
+        assert_eq!(supervisor.mode(), mode);
+        supervisor
+    }
+
+    fn events() -> Vec<Event> {
+        Command::ALL.map(Event::Command).into_iter().chain([Event::Fault, Event::Released]).collect()
+    }
+
+    #[test]
+    fn the_code_is_the_table_of_the_essay() {
+        let table: Vec<Vec<&str>> = include_str!("supervisor.rs")
+            .lines()
+            .filter_map(|line| line.strip_prefix("//! | **"))
+            .map(|line| line.split('|').map(|cell| cell.trim().trim_end_matches("**")).collect())
+            .collect();
+        assert_eq!(table.len(), Mode::ALL.len());
+        for (mode, row) in Mode::ALL.into_iter().zip(table) {
+            assert_eq!(row[0], format!("{mode:?}"));
+            for (event, cell) in events().into_iter().zip(&row[1..]) {
+                let told = match outcome(mode, event) {
+                    Outcome::Enter(mode) => format!("{mode:?}"),
+                    Outcome::Refuse(refusal) => format!("{refusal:?}!"),
+                };
+                assert_eq!(&told, cell, "{mode:?}, {event:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn what_the_table_must_never_allow() {
+        for mode in Mode::ALL {
+            for event in events() {
+                let Outcome::Enter(next) = outcome(mode, event) else { continue };
+                // Torque begins by Arm from Disarmed alone, a grasp by Grasp from Armed alone.
+                if matches!(mode, Mode::Disarmed | Mode::Fault)
+                    && !matches!(next, Mode::Disarmed | Mode::Fault)
+                {
+                    assert_eq!((mode, event), (Mode::Disarmed, Event::Command(Command::Arm)));
+                }
+                if next == Mode::Grasping && mode != Mode::Grasping {
+                    assert_eq!((mode, event), (Mode::Armed, Event::Command(Command::Grasp)));
+                }
+                // A fault is left by ClearFault alone.
+                if mode == Mode::Fault && next != Mode::Fault {
+                    assert_eq!((next, event), (Mode::Disarmed, Event::Command(Command::ClearFault)));
+                }
+            }
+            assert_eq!(outcome(mode, Event::Fault), Outcome::Enter(Mode::Fault));
+            assert!(matches!(
+                outcome(mode, Event::Command(Command::Stop)),
+                Outcome::Enter(Mode::Disarmed | Mode::Fault)
+            ));
+        }
+    }
+
+    #[test]
+    fn every_mode_and_command_does_what_the_table_says() {
+        let ramps = ramps(100, 100);
+        for mode in Mode::ALL {
+            for command in Command::ALL {
+                let mut supervisor = in_mode(mode, &ramps);
+                let answer = supervisor.begin(&ramps, None, Some(command)).unwrap();
+                assert_eq!(answer.command, command);
+                let (next, refused) = match outcome(mode, Event::Command(command)) {
+                    Outcome::Enter(next) => (next, None),
+                    Outcome::Refuse(refusal) => (mode, Some(refusal)),
+                };
+                assert_eq!((supervisor.mode(), answer.refused), (next, refused), "{mode:?}, {command:?}");
+                assert_eq!(supervisor.fault().is_some(), next == Mode::Fault);
+                if command == Command::Stop {
+                    assert_eq!((answer.refused, supervisor.drive(&ramps)), (None, Drive::Off));
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_fault_wins_over_every_command() {
+        let ramps = ramps(100, 100);
+        for mode in Mode::ALL {
+            for command in Command::ALL {
+                let mut supervisor = in_mode(mode, &ramps);
+                let answer = supervisor.begin(&ramps, Some(RAISED), Some(command)).unwrap();
+                assert_eq!((supervisor.mode(), supervisor.drive(&ramps)), (Mode::Fault, Drive::Off));
+                let refusal = match command {
+                    Command::Stop => None,
+                    Command::ClearFault => Some(Refusal::FaultPersists),
+                    _ => Some(Refusal::InFault),
+                };
+                assert_eq!(answer.refused, refusal, "{mode:?}, {command:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn the_first_fault_is_the_one_that_is_reported() {
+        let ramps = ramps(100, 100);
+        let mut supervisor = in_mode(Mode::Fault, &ramps);
+        supervisor.begin(&ramps, Some(Raised::at(0, Fault::CountJump)), None);
+        assert_eq!(supervisor.fault(), Some(RAISED));
+        supervisor.begin(&ramps, None, Some(Command::ClearFault));
+        assert_eq!((supervisor.mode(), supervisor.fault()), (Mode::Disarmed, None));
+        supervisor.begin(&ramps, Some(Raised::at(0, Fault::CountJump)), None);
+        assert_eq!(supervisor.fault(), Some(Raised::at(0, Fault::CountJump)));
+    }
+
+    /// Force and attitude shares of a tick.
+    fn shares(supervisor: &Supervisor, ramps: &Ramps<f64>) -> (f64, f64) {
+        match supervisor.drive(ramps) {
+            Drive::Grip { force_share, attitude_share } => (force_share, attitude_share),
+            drive => panic!("{drive:?}"),
+        }
+    }
+
+    #[track_caller]
+    fn near(shares: (f64, f64), force: f64, attitude: f64) {
+        assert!((shares.0 - force).abs() < 1e-12 && (shares.1 - attitude).abs() < 1e-12, "{shares:?}");
+    }
+
+    #[test]
+    fn force_grows_and_falls_over_the_stated_times() {
+        let ramps = ramps(4, 5);
+        let mut supervisor = in_mode(Mode::Grasping, &ramps);
+        for force in [0.25, 0.5, 0.75, 1.0, 1.0] {
+            near(shares(&supervisor, &ramps), force, 1.0);
+            supervisor.begin(&ramps, None, None);
+        }
+        supervisor.begin(&ramps, None, Some(Command::Release));
+        for left in [0.8, 0.6, 0.4, 0.2, 0.0] {
+            assert_eq!(supervisor.mode(), Mode::Releasing);
+            near(shares(&supervisor, &ramps), left, left);
+            supervisor.begin(&ramps, None, None);
+        }
+        assert_eq!((supervisor.mode(), supervisor.drive(&ramps)), (Mode::Armed, Drive::Hold));
+    }
+
+    #[test]
+    fn a_release_amid_the_soft_start_begins_from_the_force_reached() {
+        let ramps = ramps(4, 2);
+        let mut supervisor = in_mode(Mode::Grasping, &ramps);
+        supervisor.begin(&ramps, None, None);
+        near(shares(&supervisor, &ramps), 0.5, 1.0);
+        supervisor.begin(&ramps, None, Some(Command::Release));
+        near(shares(&supervisor, &ramps), 0.25, 0.5);
+        supervisor.begin(&ramps, None, Some(Command::Release));
+        near(shares(&supervisor, &ramps), 0.0, 0.0);
+    }
+
+    #[test]
+    fn without_times_everything_is_at_once() {
+        let ramps = ramps(0, 0);
+        let mut supervisor = in_mode(Mode::Grasping, &ramps);
+        near(shares(&supervisor, &ramps), 1.0, 1.0);
+        supervisor.begin(&ramps, None, Some(Command::Release));
+        assert_eq!(supervisor.mode(), Mode::Armed);
+    }
+
+    #[test]
+    fn a_grasp_of_many_hours_does_not_start_again() {
+        let ramps = ramps(4, 2);
+        let mut supervisor = Supervisor { age: u32::MAX - 1, ..in_mode(Mode::Grasping, &ramps) };
+        for _ in 0..4 {
+            supervisor.begin(&ramps, None, None);
+            near(shares(&supervisor, &ramps), 1.0, 1.0);
+        }
+    }
+
+    #[test]
+    fn times_out_of_range_are_named() {
+        let period = Period::from_us(1000).unwrap();
+        let config = SupervisorConfig { soft_start_ms: 4_000_000, release_ms: 0 };
+        assert_eq!(config.prepare::<f32>(period).unwrap_err().parameter, "supervisor.soft_start_ms");
+        let config = SupervisorConfig { soft_start_ms: 0, release_ms: 4_000_000 };
+        assert_eq!(config.prepare::<f32>(period).unwrap_err().parameter, "supervisor.release_ms");
+    }
+}

@@ -1,0 +1,318 @@
+//! What the tick tells the world: one [`Record`] a tick, and its bytes.
+//!
+//! - The **encoding** is postcard: fields in their order, without names; counts and numbers as variable-length
+//!   integers, `f32` as four bytes. It is positional, so that any change of [`Record`] or of a type in it is another
+//!   **interface version**.
+//! - Lists carry their run-time count: the bytes of a hand do not depend on the capacity it was built with, and a host
+//!   of large capacity reads what a microcontroller of exact size wrote.
+//! - With its parameters, the counts and the commands (which the answers repeat), a record has all that a replay needs
+//!   to compute everything else again, to the bit.
+
+mod list;
+
+pub use list::List;
+
+use crate::command::Answer;
+use crate::fault::Raised;
+use crate::limit::Limiting;
+use crate::supervisor::Mode;
+use core::fmt;
+use serde::{Deserialize, Serialize};
+
+/// Version of everything that goes over the wire. Two ends talk when theirs are equal; it has nothing to do with the
+/// release's version.
+pub const INTERFACE_VERSION: u16 = 1;
+
+/// What one tick took in, decided and put out.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(bound(deserialize = "T: Default + Deserialize<'de>"))]
+pub struct Record<T, const J: usize> {
+    /// Number of the record, one more from record to record, wrapping: what is missing was lost. The tick gives every
+    /// tick a number; who sends fewer records numbers them anew.
+    pub sequence: u32,
+    /// Number of the tick since the start, wrapping.
+    pub tick: u32,
+    /// Mode in this tick.
+    pub mode: Mode,
+    /// The fault that the hand is in.
+    pub fault: Option<Raised>,
+    /// What became of the command of this tick.
+    pub answer: Option<Answer>,
+    /// The force `f_d` that acts in this tick, N.
+    pub force_n: T,
+    /// The attitude stiffness `K_st` that acts in this tick, N m.
+    pub attitude_stiffness_nm: T,
+    /// Potential `V_s` of the approach, J.
+    pub approach_potential_j: T,
+    /// Potential `V_st` of the attitudes, above its least value, J.
+    pub attitude_potential_j: T,
+    /// Encoder counts, one a joint; empty where angles came from elsewhere, or not at all.
+    pub counts: List<i32, J>,
+    /// Torques of the next tick, N m, one a joint.
+    pub torques_nm: List<T, J>,
+    /// What limits each joint's torque.
+    pub limiting: List<Limiting, J>,
+}
+
+/// The buffer is too small for the record.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct BufferTooSmall;
+
+impl fmt::Display for BufferTooSmall {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "the buffer is too small for the record")
+    }
+}
+
+impl core::error::Error for BufferTooSmall {}
+
+/// Why bytes are not a record.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum DecodeError {
+    /// They end too early, or hold what no record holds.
+    Malformed,
+    /// There are more of them than the record has.
+    TrailingBytes,
+}
+
+impl fmt::Display for DecodeError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Malformed => {
+                write!(f, "the bytes are not a record of interface version {INTERFACE_VERSION}")
+            }
+            Self::TrailingBytes => write!(f, "there are bytes after the record"),
+        }
+    }
+}
+
+impl core::error::Error for DecodeError {}
+
+impl<const J: usize> Record<f32, J> {
+    /// Bytes that suffice for every record of up to `J` joints (`J` below 16,384).
+    pub const MOST_BYTES: usize = {
+        let (number, option, float) = (5, 1, 4);
+        let (mode, fault, answer) = (1, option + 2, option + 1 + option + 1);
+        let list = 2;
+        2 * number + mode + fault + answer + 4 * float + 3 * list + J * (number + float + 1)
+    };
+
+    /// Writes the record into a buffer and returns the part that was written.
+    ///
+    /// # Errors
+    /// If the buffer is too small; [`Self::MOST_BYTES`] always suffice.
+    pub fn encode<'a>(&self, buffer: &'a mut [u8]) -> Result<&'a mut [u8], BufferTooSmall> {
+        postcard::to_slice(self, buffer).map_err(|_| BufferTooSmall)
+    }
+
+    /// Reads a record that takes up all the bytes.
+    ///
+    /// # Errors
+    /// If they are anything else.
+    pub fn decode(bytes: &[u8]) -> Result<Self, DecodeError> {
+        match postcard::take_from_bytes(bytes) {
+            Ok((record, [])) => Ok(record),
+            Ok(_) => Err(DecodeError::TrailingBytes),
+            Err(_) => Err(DecodeError::Malformed),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::command::{Command, Refusal};
+    use crate::fault::Fault;
+    use crate::limit::Limit;
+    use proptest::prelude::*;
+    use std::format;
+    use std::string::String;
+    use std::vec::Vec;
+
+    fn example<const J: usize>() -> Record<f32, J> {
+        let mut limiting = [Limiting::NONE; J];
+        limiting[1].insert(Limit::Torque);
+        limiting[1].insert(Limit::UpperStop);
+        let (mut counts, mut torques) = ([0; J], [0.0; J]);
+        counts[..3].copy_from_slice(&[0, -1, 21_600]);
+        torques[..3].copy_from_slice(&[0.5, -1.25, 0.0]);
+        Record {
+            sequence: 300,
+            tick: 70_000,
+            mode: Mode::Fault,
+            fault: Some(Raised::at(2, Fault::CountJump)),
+            answer: Some(Answer { command: Command::ClearFault, refused: Some(Refusal::FaultPersists) }),
+            force_n: 5.0,
+            attitude_stiffness_nm: 0.005,
+            approach_potential_j: 0.25,
+            attitude_potential_j: 0.125,
+            counts: List::first_of(counts, 3),
+            torques_nm: List::first_of(torques, 3),
+            limiting: List::first_of(limiting, 3),
+        }
+    }
+
+    fn hex(bytes: &[u8]) -> String {
+        bytes.iter().map(|byte| format!("{byte:02x}")).collect()
+    }
+
+    /// The bytes of interface version 1. If this fails, the interface has changed: raise [`INTERFACE_VERSION`], and
+    /// only then replace the bytes.
+    #[test]
+    fn golden_bytes() {
+        let golden = concat!(
+            "ac02",                       // sequence
+            "f0a204",                     // tick
+            "04",                         // mode
+            "010302",                     // fault
+            "01050106",                   // answer
+            "0000a040",                   // force
+            "0ad7a33b",                   // attitude stiffness
+            "0000803e",                   // approach potential
+            "0000003e",                   // attitude potential
+            "030001c0d102",               // counts
+            "030000003f0000a0bf00000000", // torques
+            "03000900",                   // limiting
+        );
+        let mut buffer = [0; Record::<f32, 3>::MOST_BYTES];
+        assert_eq!(INTERFACE_VERSION, 1);
+        assert_eq!(hex(example::<3>().encode(&mut buffer).unwrap()), golden);
+        let mut buffer = [0; Record::<f32, 32>::MOST_BYTES];
+        assert_eq!(hex(example::<32>().encode(&mut buffer).unwrap()), golden, "depends on the capacity");
+    }
+
+    #[test]
+    fn every_mode_command_refusal_and_fault_keeps_its_byte() {
+        let bytes = |values: Vec<Vec<u8>>| hex(&values.concat());
+        let mut buffer = [0; 8];
+        let mut modes = Vec::new();
+        for mode in Mode::ALL {
+            modes.push(postcard::to_slice(&mode, &mut buffer).unwrap().to_vec());
+        }
+        assert_eq!(bytes(modes), "0001020304");
+        let mut commands = Vec::new();
+        for command in Command::ALL {
+            commands.push(postcard::to_slice(&command, &mut buffer).unwrap().to_vec());
+        }
+        assert_eq!(bytes(commands), "000102030405");
+        let mut refusals = Vec::new();
+        for refusal in Refusal::ALL {
+            refusals.push(postcard::to_slice(&refusal, &mut buffer).unwrap().to_vec());
+        }
+        assert_eq!(bytes(refusals), "00010203040506");
+        let mut faults = Vec::new();
+        for fault in Fault::ALL {
+            faults.push(postcard::to_slice(fault, &mut buffer).unwrap().to_vec());
+        }
+        assert_eq!(bytes(faults), "010203040506");
+    }
+
+    #[test]
+    fn the_largest_record_fits() {
+        let record = Record::<f32, 12> {
+            sequence: u32::MAX,
+            tick: u32::MAX,
+            counts: List::first_of([i32::MIN; 12], 12),
+            torques_nm: List::first_of([f32::MIN; 12], 12),
+            limiting: List::first_of([Limiting::NONE; 12], 12),
+            ..example()
+        };
+        let mut buffer = [0; Record::<f32, 12>::MOST_BYTES];
+        let length = record.encode(&mut buffer).unwrap().len();
+        // The three counts of the lists take one byte each, not two.
+        assert_eq!(length + 3, Record::<f32, 12>::MOST_BYTES);
+        assert_eq!(record.encode(&mut [0; 100]), Err(BufferTooSmall));
+    }
+
+    #[test]
+    fn what_is_no_record_is_refused() {
+        let mut buffer = [0; Record::<f32, 3>::MOST_BYTES];
+        let bytes = example::<3>().encode(&mut buffer).unwrap().to_vec();
+        for length in 0..bytes.len() {
+            assert_eq!(Record::<f32, 3>::decode(&bytes[..length]), Err(DecodeError::Malformed));
+        }
+        let longer = [&bytes[..], &[0]].concat();
+        assert_eq!(Record::<f32, 3>::decode(&longer), Err(DecodeError::TrailingBytes));
+        assert_eq!(
+            Record::<f32, 2>::decode(&bytes),
+            Err(DecodeError::Malformed),
+            "more joints than capacity"
+        );
+        let mut unknown_fault = bytes;
+        unknown_fault[7] = 99;
+        assert_eq!(Record::<f32, 3>::decode(&unknown_fault), Err(DecodeError::Malformed));
+    }
+
+    fn answers() -> impl Strategy<Value = Option<Answer>> {
+        let command = proptest::sample::select(&Command::ALL[..]);
+        let refused = proptest::option::of(proptest::sample::select(&Refusal::ALL[..]));
+        proptest::option::of((command, refused).prop_map(|(command, refused)| Answer { command, refused }))
+    }
+
+    prop_compose! {
+        fn records()(
+            (sequence, tick) in any::<(u32, u32)>(),
+            mode in proptest::sample::select(&Mode::ALL[..]),
+            fault in proptest::option::of((proptest::sample::select(Fault::ALL), any::<u8>())),
+            answer in answers(),
+            floats in any::<[f32; 4]>(),
+            count in 0..=12_usize,
+            counts in any::<[i32; 12]>(),
+            torques in any::<[f32; 12]>(),
+            limits in any::<[[bool; 4]; 12]>(),
+        ) -> Record<f32, 12> {
+            let limiting = limits.map(|bits| {
+                let mut limiting = Limiting::NONE;
+                Limit::ALL.into_iter().zip(bits).filter(|(_, on)| *on).for_each(|(limit, _)| limiting.insert(limit));
+                limiting
+            });
+            Record {
+                sequence,
+                tick,
+                mode,
+                fault: fault.map(|(fault, joint)| Raised { fault, joint }),
+                answer,
+                force_n: floats[0],
+                attitude_stiffness_nm: floats[1],
+                approach_potential_j: floats[2],
+                attitude_potential_j: floats[3],
+                counts: List::first_of(counts, count),
+                torques_nm: List::first_of(torques, count),
+                limiting: List::first_of(limiting, count),
+            }
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn records_come_back_as_they_were_sent(record in records()) {
+            let mut buffer = [0; Record::<f32, 12>::MOST_BYTES];
+            let bytes = record.encode(&mut buffer).unwrap().to_vec();
+            let decoded = Record::<f32, 12>::decode(&bytes).unwrap();
+            prop_assert_eq!(&decoded, &record);
+            let mut again = [0; Record::<f32, 12>::MOST_BYTES];
+            prop_assert_eq!(decoded.encode(&mut again).unwrap(), &bytes[..]);
+        }
+
+        #[test]
+        fn any_bytes_decode_or_are_refused(bytes in proptest::collection::vec(any::<u8>(), 0..200)) {
+            // What decodes encodes to a record that is the same: NaN compares by its bits.
+            if let Ok(record) = Record::<f32, 12>::decode(&bytes) {
+                let mut buffer = [0; Record::<f32, 12>::MOST_BYTES];
+                let encoded = record.encode(&mut buffer).unwrap().to_vec();
+                let again = Record::<f32, 12>::decode(&encoded).unwrap();
+                let mut buffer = [0; Record::<f32, 12>::MOST_BYTES];
+                prop_assert_eq!(again.encode(&mut buffer).unwrap(), &encoded[..]);
+            }
+        }
+
+        #[test]
+        fn damaged_records_decode_or_are_refused(record in records(), at in 0..100_usize, bits in 1..=255_u8) {
+            let mut buffer = [0; Record::<f32, 12>::MOST_BYTES];
+            let bytes = record.encode(&mut buffer).unwrap();
+            let at = at % bytes.len();
+            bytes[at] ^= bits;
+            let _ = Record::<f32, 12>::decode(bytes);
+        }
+    }
+}

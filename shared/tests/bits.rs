@@ -1,0 +1,93 @@
+//! The tick gives the same bits everywhere: on every target and at every optimisation, in `f32`.
+
+mod common;
+
+use blindgrasp_shared::command::Command;
+use blindgrasp_shared::supervisor::Mode;
+use blindgrasp_shared::telemetry::Record;
+use blindgrasp_shared::tick::{State, tick, tick_blind};
+use common::{JOINTS, config, facing_counts, params};
+
+/// Knuth's MMIX generator, its high half.
+struct Lcg(u64);
+
+impl Lcg {
+    fn below(&mut self, bound: u32) -> u32 {
+        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        ((self.0 >> 32) as u32) % bound
+    }
+}
+
+/// FNV-1a, 64 bits.
+struct Fnv(u64);
+
+impl Fnv {
+    fn take(&mut self, bytes: &[u8]) {
+        for byte in bytes {
+            self.0 = (self.0 ^ u64::from(*byte)).wrapping_mul(0x0000_0100_0000_01b3);
+        }
+    }
+}
+
+/// A hand of some capacity through 5,000 ticks of jittering, wandering and now and then impossible counts and of
+/// commands in any order; the hash of all torques and records, and how many ticks were spent in each mode.
+fn run<const J: usize, const F: usize>() -> (u64, [u32; 5]) {
+    let params = params::<f32, J, F>(&config());
+    let mut state = State::new();
+    let mut lcg = Lcg(2009);
+    let mut hash = Fnv(0xcbf2_9ce4_8422_2325);
+    let mut ticks_in = [0; 5];
+    let mut counts = facing_counts::<J>();
+    let mut buffer = vec![0; Record::<f32, J>::MOST_BYTES];
+    for _ in 0..5_000 {
+        for count in counts.iter_mut().take(JOINTS) {
+            *count += lcg.below(9) as i32 - 4;
+        }
+        match lcg.below(500) {
+            0 => counts = facing_counts(),
+            1 => counts[lcg.below(JOINTS as u32) as usize] += 30_000,
+            2 => counts[lcg.below(JOINTS as u32) as usize] -= 400,
+            _ => {}
+        }
+        // The orders that lead to a grasp come often enough for one, the others seldom.
+        let command = match lcg.below(400) {
+            0..10 => Some(Command::Arm),
+            10..20 => Some(Command::Grasp),
+            20..30 => Some(Command::ClearFault),
+            30 => Some(Command::Release),
+            31 => Some(Command::Stop),
+            32 => Some(Command::Disarm),
+            _ => None,
+        };
+        let output = match lcg.below(1_000) {
+            0 => tick_blind(&params, &mut state, 7, command),
+            _ => tick(&params, &mut state, &counts, command),
+        };
+        if let Some(ticks) = ticks_in.get_mut(output.record.mode as usize) {
+            *ticks += 1;
+        }
+        if output.record.mode == Mode::Fault {
+            counts = facing_counts();
+        }
+        for torque in output.torques_nm.iter().take(JOINTS) {
+            hash.take(&torque.to_bits().to_le_bytes());
+        }
+        hash.take(output.record.encode(&mut buffer).expect("the buffer is large enough"));
+    }
+    (hash.0, ticks_in)
+}
+
+/// If this fails without a change to what the tick computes, bit equality is lost. If what it computes was meant to
+/// change, so is the hash.
+#[test]
+fn the_bits_are_those_of_every_other_machine() {
+    let (hash, ticks_in) = run::<12, 3>();
+    println!("hash {hash:#018x}, ticks in each mode {ticks_in:?}");
+    assert!(ticks_in.iter().all(|&ticks| ticks >= 100), "{ticks_in:?}");
+    assert_eq!(hash, 0xb37d_ba7f_5eca_1701, "{hash:#018x}");
+}
+
+#[test]
+fn the_bits_do_not_depend_on_the_capacity() {
+    assert_eq!(run::<12, 3>(), run::<20, 5>());
+}

@@ -1,0 +1,125 @@
+//! A hand for the tests of the tick: three fingers of four joints, with the lengths and masses of the paper's Table IV.
+
+#![allow(dead_code, reason = "each test file uses its part")]
+
+use blindgrasp_shared::control::GraspConfig;
+use blindgrasp_shared::estimate::{Encoder, EstimatorConfig};
+use blindgrasp_shared::fault::FaultConfig;
+use blindgrasp_shared::hand::{Fingertip, Hand, Joint, Link};
+use blindgrasp_shared::limit::{LimitConfig, StopConfig};
+use blindgrasp_shared::math::Real;
+use blindgrasp_shared::supervisor::SupervisorConfig;
+use blindgrasp_shared::tick::{Config, Params};
+use nalgebra::{Matrix3, Vector3};
+
+/// Joints of the hand.
+pub(crate) const JOINTS: usize = 12;
+
+/// Counts of one radian: 4,000 counts a turn behind a gear of 5.4 : 1, 0.0167 degrees each.
+pub(crate) const COUNTS_PER_RAD: f64 = 4000.0 * 5.4 / core::f64::consts::TAU;
+
+/// Largest torque of a joint, N m.
+pub(crate) const TORQUE_NM: f64 = 1.39;
+
+/// Largest change of a joint's torque, N m/s.
+pub(crate) const SLEW_NM_S: f64 = 100.0;
+
+/// Angles with which the fingertips face each other, rad.
+pub(crate) const FACING_RAD: [f64; 4] = [0.0, -0.5, 0.9, 0.8];
+
+fn vector<T: Real>(x: f64, y: f64, z: f64) -> Vector3<T> {
+    Vector3::new(x, y, z).map(T::from_f64)
+}
+
+/// The hand.
+pub(crate) fn hand<T: Real, const J: usize, const F: usize>() -> Hand<T, J, F> {
+    let mut joints = Vec::new();
+    let mut fingertips = Vec::new();
+    let half_root_of_three = 0.866_025_403_784_438_6;
+    for (c, s) in [(1.0, 0.0), (-0.5, half_root_of_three), (-0.5, -half_root_of_three)] {
+        let first = joints.len();
+        // Local axes of a finger: x away from the palm's axis, z out of the palm.
+        let azimuth = Matrix3::new(c, -s, 0.0, s, c, 0.0, 0.0, 0.0, 1.0).map(T::from_f64);
+        let flexion = vector(0.0, -1.0, 0.0);
+        let link = |mass: f64, centre: f64, inertia: f64| Link {
+            mass_kg: T::from_f64(mass),
+            mass_centre_m: vector(0.0, 0.0, centre),
+            inertia_kg_m2: Matrix3::identity() * T::from_f64(inertia),
+        };
+        let joint = |parent, z, axis, link| Joint {
+            parent,
+            offset_m: vector(0.0, 0.0, z),
+            attitude: Matrix3::identity(),
+            axis,
+            lower_rad: T::from_f64(-2.0),
+            upper_rad: T::from_f64(2.0),
+            link,
+        };
+        joints.push(Joint {
+            offset_m: vector(0.035 * c, 0.035 * s, 0.0),
+            attitude: azimuth,
+            ..joint(None, 0.0, vector(-1.0, 0.0, 0.0), link(0.0, 0.0, 0.0))
+        });
+        joints.push(joint(Some(first), 0.0, flexion, link(0.038, 0.023, 1.3e-5)));
+        joints.push(joint(Some(first + 1), 0.064, flexion, link(0.024, 0.035, 0.8e-5)));
+        joints.push(joint(Some(first + 2), 0.064, flexion, link(0.054, 0.010, 0.4e-5)));
+        let (offset_m, radius_m) = (vector(0.0, 0.0, 0.030), T::from_f64(0.015));
+        fingertips.push(Fingertip { link: first + 3, offset_m, radius_m });
+    }
+    Hand::new(&joints, &fingertips).expect("the test's hand is a hand")
+}
+
+/// The gains of the paper's Table VII, and every limit and fault switched on.
+pub(crate) fn config<T: Real, const J: usize>() -> Config<T, J> {
+    let real = T::from_f64;
+    let encoder = Encoder { zero_count: 0, rad_per_count: real(1.0 / COUNTS_PER_RAD), reversed: false };
+    let mut damping_nm_s = [T::zero(); J];
+    for (k, damping) in damping_nm_s.iter_mut().enumerate().take(JOINTS) {
+        *damping = real([4e-4, 4e-4, 3e-4, 2e-4][k % 4]);
+    }
+    Config {
+        period_us: 1000,
+        estimator: EstimatorConfig { bandwidth_hz: real(100.0), encoders: [encoder; J] },
+        law: GraspConfig {
+            force_n: real(5.0),
+            attitude_stiffness_nm: real(5e-3),
+            damping_nm_s,
+            gravity_m_s2: Some(vector(0.0, 0.0, -9.81)),
+        },
+        limits: LimitConfig {
+            torque_nm: Some([real(TORQUE_NM); J]),
+            slew_nm_s: Some([real(SLEW_NM_S); J]),
+            stops: Some(StopConfig {
+                margin_rad: [real(0.1); J],
+                stiffness_nm_rad: [real(2.0); J],
+                damping_nm_s: [real(0.01); J],
+            }),
+        },
+        faults: FaultConfig {
+            possible_speed_rad_s: Some([real(200.0); J]),
+            speed_limit_rad_s: Some([real(20.0); J]),
+            range_slack_rad: Some(real(0.05)),
+            saturated_ms: Some(200),
+        },
+        supervisor: SupervisorConfig { soft_start_ms: 100, release_ms: 100 },
+    }
+}
+
+/// The hand with a configuration.
+pub(crate) fn params<T: Real, const J: usize, const F: usize>(config: &Config<T, J>) -> Params<T, J, F> {
+    Params::new(hand(), config).expect("the test's parameters are good")
+}
+
+/// Angles of all joints with the fingertips facing each other, rad.
+pub(crate) fn facing_rad<T: Real, const J: usize>() -> [T; J] {
+    let mut angles = [T::zero(); J];
+    for (k, angle) in angles.iter_mut().enumerate().take(JOINTS) {
+        *angle = T::from_f64(FACING_RAD[k % 4]);
+    }
+    angles
+}
+
+/// Counts of all joints with the fingertips facing each other.
+pub(crate) fn facing_counts<const J: usize>() -> [i32; J] {
+    facing_rad::<f64, J>().map(|angle| (angle * COUNTS_PER_RAD).round() as i32)
+}

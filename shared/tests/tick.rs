@@ -1,0 +1,434 @@
+//! The tick as a whole: modes, limits and faults through the one function.
+
+mod common;
+
+use blindgrasp_shared::command::{Answer, Command, Refusal};
+use blindgrasp_shared::fault::{Fault, FaultConfig, Raised};
+use blindgrasp_shared::limit::{Limit, LimitConfig};
+use blindgrasp_shared::supervisor::{Mode, SupervisorConfig};
+use blindgrasp_shared::telemetry::Record;
+use blindgrasp_shared::tick::{Config, Output, Params, State, tick, tick_blind, tick_with};
+use common::{JOINTS, SLEW_NM_S, TORQUE_NM, config, facing_counts, facing_rad, params};
+use proptest::prelude::*;
+
+type TestParams = Params<f32, 12, 3>;
+type TestState = State<f32, 12, 3>;
+
+/// Ticks at the facing posture with one command each, then without; returns the last.
+fn drive(params: &TestParams, state: &mut TestState, commands: &[Command], ticks: usize) -> Output<f32, 12> {
+    let counts = facing_counts();
+    for &command in commands {
+        let output = tick(params, state, &counts, Some(command));
+        assert_eq!(output.record.answer, Some(Answer { command, refused: None }));
+    }
+    for _ in 1..ticks {
+        tick(params, state, &counts, None);
+    }
+    tick(params, state, &counts, None)
+}
+
+/// A state that was led into a mode.
+fn in_mode(params: &TestParams, mode: Mode) -> TestState {
+    let mut state = State::new();
+    let commands: &[Command] = match mode {
+        Mode::Disarmed | Mode::Fault => &[],
+        Mode::Armed => &[Command::Arm],
+        Mode::Grasping | Mode::Releasing => &[Command::Arm, Command::Grasp],
+    };
+    drive(params, &mut state, commands, 50);
+    match mode {
+        Mode::Releasing => drop(tick(params, &mut state, &facing_counts(), Some(Command::Release))),
+        Mode::Fault => drop(tick_blind(params, &mut state, 0, None)),
+        _ => {}
+    }
+    assert_eq!(state.mode(), mode);
+    state
+}
+
+fn has_torque(output: &Output<f32, 12>) -> bool {
+    output.torques_nm.iter().any(|&torque| torque != 0.0)
+}
+
+#[test]
+fn each_mode_drives_as_it_should() {
+    let params = params(&config());
+    for mode in Mode::ALL {
+        let mut state = in_mode(&params, mode);
+        let output = tick(&params, &mut state, &facing_counts(), None);
+        let torque = !matches!(mode, Mode::Disarmed | Mode::Fault);
+        assert_eq!(has_torque(&output), torque, "{mode:?}");
+        let grip = matches!(mode, Mode::Grasping | Mode::Releasing);
+        assert_eq!(output.record.force_n > 0.0, grip, "{mode:?}");
+        assert_eq!(output.record.attitude_stiffness_nm > 0.0, grip, "{mode:?}");
+        assert_eq!(output.record.approach_potential_j > 0.0, grip, "{mode:?}");
+        assert_eq!(state.latch().is_some(), grip, "{mode:?}");
+    }
+}
+
+#[test]
+fn stop_takes_the_torque_away_within_one_tick_in_every_mode() {
+    let params = params(&config());
+    for mode in Mode::ALL {
+        let mut state = in_mode(&params, mode);
+        let output = tick(&params, &mut state, &facing_counts(), Some(Command::Stop));
+        assert_eq!(output.torques_nm, [0.0; 12], "{mode:?}");
+        assert_eq!(output.record.answer, Some(Answer { command: Command::Stop, refused: None }));
+        let next = if mode == Mode::Fault { Mode::Fault } else { Mode::Disarmed };
+        assert_eq!(output.record.mode, next);
+    }
+}
+
+#[test]
+fn a_fault_takes_the_torque_away_within_one_tick_in_every_mode() {
+    let params = params(&config());
+    for mode in Mode::ALL {
+        let mut state = in_mode(&params, mode);
+        let output = tick_blind(&params, &mut state, 5, None);
+        assert_eq!((output.record.mode, output.torques_nm), (Mode::Fault, [0.0; 12]), "{mode:?}");
+        assert!(state.latch().is_none());
+        let output = tick(&params, &mut state, &facing_counts(), Some(Command::ClearFault));
+        assert_eq!((output.record.mode, output.torques_nm), (Mode::Disarmed, [0.0; 12]));
+        assert_eq!(output.record.fault, None);
+    }
+}
+
+#[test]
+fn attitudes_are_latched_at_the_first_grasping_tick_and_anew_for_each_grasp() {
+    let params = params(&config());
+    let mut state = in_mode(&params, Mode::Armed);
+    let record = tick(&params, &mut state, &facing_counts(), Some(Command::Grasp)).record;
+    assert!(record.attitude_potential_j.abs() < 1e-7, "{}", record.attitude_potential_j);
+    let first = *state.latch().unwrap();
+    let mut turned = facing_counts();
+    let mut record = record;
+    for _ in 0..50 {
+        turned[3] += 20;
+        record = tick(&params, &mut state, &turned, None).record;
+    }
+    // 1,000 counts are 0.29 rad: 2 K_st (1 - cos a) for each of the fingertip's two neighbours, in a ring of three.
+    let expected = 2.0 * 2.0 * 5e-3 * (1.0 - 0.958_0);
+    assert!(
+        (record.attitude_potential_j - expected).abs() < 0.1 * expected,
+        "{}",
+        record.attitude_potential_j
+    );
+    let record = tick(&params, &mut state, &turned, Some(Command::Grasp)).record;
+    assert!(record.attitude_potential_j > 0.0, "a repeated command must not latch anew");
+    assert_eq!(state.latch(), Some(&first));
+    for command in [Command::Stop, Command::Arm, Command::Grasp] {
+        tick(&params, &mut state, &turned, Some(command));
+    }
+    assert_ne!(state.latch(), Some(&first));
+}
+
+#[test]
+fn force_grows_over_the_soft_start_and_falls_over_the_release() {
+    let params = params(&config());
+    let mut state = in_mode(&params, Mode::Armed);
+    let counts = facing_counts();
+    let mut last = tick(&params, &mut state, &counts, Some(Command::Grasp)).record;
+    assert_eq!(last.force_n, 5.0 * (1.0_f32 / 100.0));
+    for _ in 1..100 {
+        let record = tick(&params, &mut state, &counts, None).record;
+        assert!(record.force_n > last.force_n);
+        assert_eq!(record.attitude_stiffness_nm, 5e-3);
+        last = record;
+    }
+    assert_eq!(last.force_n, 5.0);
+    let mut last = tick(&params, &mut state, &counts, Some(Command::Release)).record;
+    for _ in 1..100 {
+        let record = tick(&params, &mut state, &counts, None).record;
+        assert!(record.force_n < last.force_n && record.attitude_stiffness_nm < last.attitude_stiffness_nm);
+        assert_eq!(record.mode, Mode::Releasing);
+        last = record;
+    }
+    assert_eq!((last.force_n, last.attitude_stiffness_nm), (0.0, 0.0));
+    let record = tick(&params, &mut state, &counts, None).record;
+    assert_eq!((record.mode, state.latch()), (Mode::Armed, None));
+}
+
+#[test]
+fn refused_commands_are_answered_with_the_reason() {
+    let params: TestParams = params(&config());
+    let mut state = TestState::new();
+    let record = tick(&params, &mut state, &facing_counts(), Some(Command::Grasp)).record;
+    let answer = Answer { command: Command::Grasp, refused: Some(Refusal::NotArmed) };
+    assert_eq!((record.answer, record.mode), (Some(answer), Mode::Disarmed));
+}
+
+#[test]
+fn each_limit_shows_in_the_record() {
+    let mut config = config();
+    config.law.force_n = 500.0;
+    config.supervisor.soft_start_ms = 0;
+    let params = params(&config);
+    let mut state = in_mode(&params, Mode::Armed);
+    let seen = |output: &Output<f32, 12>, limit| output.record.limiting.iter().any(|l| l.contains(limit));
+    let output = tick(&params, &mut state, &facing_counts(), Some(Command::Grasp));
+    assert!(seen(&output, Limit::Slew));
+    let output = drive(&params, &mut state, &[], 50);
+    assert!(seen(&output, Limit::Torque) && !seen(&output, Limit::LowerStop));
+    for (sign, limit) in [(1, Limit::UpperStop), (-1, Limit::LowerStop)] {
+        let mut state = TestState::new();
+        let mut counts = facing_counts();
+        counts[0] = sign * 6_600; // 1.92 rad of 2
+        tick(&params, &mut state, &counts, Some(Command::Arm));
+        let output = tick(&params, &mut state, &counts, None);
+        assert!(output.record.limiting.as_slice()[0].contains(limit));
+        assert!(!output.record.limiting.as_slice()[4].contains(limit));
+    }
+}
+
+#[track_caller]
+fn faulted(output: &Output<f32, 12>, joint: usize, fault: Fault) {
+    assert_eq!(output.record.fault, Some(Raised::at(joint, fault)));
+    assert_eq!((output.record.mode, output.torques_nm), (Mode::Fault, [0.0; 12]));
+    assert!(output.record.limiting.iter().all(|limiting| limiting.is_empty()));
+}
+
+#[test]
+fn a_missing_sample_is_a_fault() {
+    let params = params(&config());
+    let mut state = in_mode(&params, Mode::Grasping);
+    faulted(&tick_blind(&params, &mut state, 5, None), 5, Fault::SampleMissing);
+    // The estimator starts anew: where the joint is by then is no jump.
+    let mut counts = facing_counts();
+    counts[5] += 2_000;
+    let record = tick(&params, &mut state, &counts, Some(Command::ClearFault)).record;
+    assert_eq!(record.mode, Mode::Disarmed);
+}
+
+#[test]
+fn an_impossible_count_is_a_fault() {
+    let params = params(&config());
+    // 200 rad/s are 687.5 counts a tick; 687 and the rounding of both ends are possible.
+    for (jump, fault) in [(689, Fault::CountJump), (-689, Fault::CountJump), (688, Fault::Overspeed)] {
+        let mut state = in_mode(&params, Mode::Grasping);
+        let mut counts = facing_counts();
+        counts[3] += jump;
+        faulted(&tick(&params, &mut state, &counts, None), 3, fault);
+    }
+}
+
+#[test]
+fn a_joint_beyond_its_range_is_a_fault_that_persists() {
+    let params = params(&config());
+    let mut state = TestState::new();
+    let mut counts = facing_counts();
+    counts[10] = 7_100; // 2.065 rad; the range ends at 2, the slack at 2.05
+    faulted(&tick(&params, &mut state, &counts, None), 10, Fault::BeyondRange);
+    let output = tick(&params, &mut state, &counts, Some(Command::ClearFault));
+    faulted(&output, 10, Fault::BeyondRange);
+    assert_eq!(output.record.answer.unwrap().refused, Some(Refusal::FaultPersists));
+}
+
+#[test]
+fn a_joint_that_turns_too_fast_is_a_fault() {
+    let params = params(&config());
+    let mut state = in_mode(&params, Mode::Armed);
+    let mut counts = facing_counts();
+    // 22 rad/s; the limit is 20. The filter needs some ticks to be sure.
+    let found = (0..20).position(|_| {
+        counts[6] -= 76;
+        tick(&params, &mut state, &counts, None).record.mode == Mode::Fault
+    });
+    assert!(found.is_some_and(|ticks| ticks <= 8), "{found:?}");
+    assert_eq!(state.fault(), Some(Raised::at(6, Fault::Overspeed)));
+}
+
+#[test]
+fn a_torque_at_its_limit_for_too_long_is_a_fault() {
+    let mut config = config();
+    config.law.force_n = 500.0;
+    config.supervisor.soft_start_ms = 0;
+    config.limits.slew_nm_s = None;
+    let params = params(&config);
+    let mut state = in_mode(&params, Mode::Armed);
+    tick(&params, &mut state, &facing_counts(), Some(Command::Grasp));
+    let record = drive(&params, &mut state, &[], 199).record;
+    assert_eq!(record.mode, Mode::Grasping);
+    let output = drive(&params, &mut state, &[], 1);
+    assert_eq!(output.record.fault.map(|raised| raised.fault), Some(Fault::SaturatedTooLong));
+    assert_eq!((output.record.mode, output.torques_nm), (Mode::Fault, [0.0; 12]));
+    let record = drive(&params, &mut state, &[Command::ClearFault], 1).record;
+    assert_eq!(record.mode, Mode::Disarmed);
+}
+
+#[test]
+fn what_is_not_finite_is_a_fault_and_never_a_torque() {
+    let ideal = Config { limits: LimitConfig::NONE, faults: FaultConfig::LEAST, ..config() };
+    for config in [config(), ideal] {
+        let params: TestParams = params(&config);
+        for bad in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
+            for (bad_angle, bad_speed) in [(bad, 0.0), (0.0, bad)] {
+                let mut state = in_mode(&params, Mode::Grasping);
+                let (mut angles, mut speeds) = (facing_rad(), [0.0; 12]);
+                angles[8] += bad_angle;
+                speeds[8] += bad_speed;
+                let output = tick_with(&params, &mut state, &angles, &speeds, None);
+                faulted(&output, 8, Fault::NotFinite);
+                let output =
+                    tick_with(&params, &mut state, &facing_rad(), &[0.0; 12], Some(Command::ClearFault));
+                assert_eq!(output.record.mode, Mode::Disarmed);
+                assert!(
+                    drive(&params, &mut state, &[Command::Arm, Command::Grasp], 9)
+                        .torques_nm
+                        .iter()
+                        .all(|t| t.is_finite())
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn gains_that_overflow_are_a_fault_even_behind_a_torque_limit() {
+    let mut config = config();
+    config.law.damping_nm_s[4] = f32::MAX;
+    let params: TestParams = params(&config);
+    let mut state = in_mode(&params, Mode::Armed);
+    let mut speeds = [0.0; 12];
+    speeds[4] = 10.0;
+    let output = tick_with(&params, &mut state, &facing_rad(), &speeds, None);
+    faulted(&output, 4, Fault::NotFinite);
+}
+
+#[test]
+fn ideal_sensors_and_encoders_differ_by_the_estimator_alone() {
+    let params: TestParams = params(&config());
+    let (mut with_counts, mut with_angles) = (TestState::new(), TestState::new());
+    let mut counts = facing_counts();
+    for k in 0..600 {
+        counts[k % JOINTS] += (k % 5) as i32 - 2;
+        let command = match k {
+            5 => Some(Command::Arm),
+            20 => Some(Command::Grasp),
+            400 => Some(Command::Release),
+            _ => None,
+        };
+        let one = tick(&params, &mut with_counts, &counts, command);
+        let (angles, speeds) = (*with_counts.angles_rad(), *with_counts.speeds_rad_s());
+        let other = tick_with(&params, &mut with_angles, &angles, &speeds, command);
+        assert_eq!(one.torques_nm, other.torques_nm);
+        assert_eq!(other.record.counts.as_slice(), &[]);
+        assert_eq!(Record { counts: one.record.counts, ..other.record }, one.record);
+    }
+    assert_eq!(with_counts.mode(), Mode::Armed);
+}
+
+#[test]
+fn records_are_numbered() {
+    let params = params(&config());
+    let mut state = TestState::new();
+    for k in 0..10 {
+        let record = tick(&params, &mut state, &facing_counts(), None).record;
+        assert_eq!((record.sequence, record.tick), (k, k));
+        assert_eq!(record.counts.as_slice(), &facing_counts::<12>());
+    }
+}
+
+#[test]
+fn parameters_out_of_range_are_named_with_their_joint() {
+    let error = |change: fn(&mut Config<f32, 12>)| {
+        let mut config = config();
+        change(&mut config);
+        let error = TestParams::new(common::hand(), &config).unwrap_err();
+        (error.parameter, error.joint)
+    };
+    assert_eq!(error(|c| c.period_us = 0), ("period_us", None));
+    assert_eq!(error(|c| c.estimator.bandwidth_hz = 0.0), ("estimator.bandwidth_hz", None));
+    assert_eq!(error(|c| c.estimator.encoders[7].rad_per_count = 0.0), ("estimator.rad_per_count", Some(7)));
+    assert_eq!(error(|c| c.law.damping_nm_s[7] = -1.0), ("damping_nm_s", Some(7)));
+    assert_eq!(error(|c| c.limits.torque_nm = Some(with(1.0, 7, 0.0))), ("limits.torque_nm", Some(7)));
+    assert_eq!(error(|c| c.limits.slew_nm_s = Some(with(1.0, 7, f32::NAN))), ("limits.slew_nm_s", Some(7)));
+    let stops = |change: fn(&mut blindgrasp_shared::limit::StopConfig<f32, 12>)| {
+        let mut config: Config<f32, 12> = config();
+        change(config.limits.stops.as_mut().unwrap());
+        let error = TestParams::new(common::hand(), &config).unwrap_err();
+        (error.parameter, error.joint)
+    };
+    assert_eq!(stops(|s| s.margin_rad[7] = 2.1), ("limits.stops.margin_rad", Some(7)));
+    assert_eq!(stops(|s| s.stiffness_nm_rad[7] = -1.0), ("limits.stops.stiffness_nm_rad", Some(7)));
+    assert_eq!(stops(|s| s.damping_nm_s[7] = f32::INFINITY), ("limits.stops.damping_nm_s", Some(7)));
+    let name = "faults.possible_speed_rad_s";
+    assert_eq!(error(|c| c.faults.possible_speed_rad_s = Some(with(1.0, 7, 0.0))), (name, Some(7)));
+    let name = "faults.speed_limit_rad_s";
+    assert_eq!(error(|c| c.faults.speed_limit_rad_s = Some(with(1.0, 7, 0.0))), (name, Some(7)));
+    assert_eq!(error(|c| c.faults.range_slack_rad = Some(-0.1)), ("faults.range_slack_rad", None));
+    assert_eq!(error(|c| c.faults.saturated_ms = Some(u32::MAX)), ("faults.saturated_ms", None));
+    let supervisor = SupervisorConfig { soft_start_ms: 0, release_ms: u32::MAX };
+    let mut config = config();
+    config.supervisor = supervisor;
+    let told = TestParams::new(common::hand(), &config).unwrap_err().to_string();
+    assert_eq!(told, "supervisor.release_ms has to be at most an hour (3600000)");
+}
+
+/// The same value for all joints but one.
+fn with(all: f32, joint: usize, value: f32) -> [f32; 12] {
+    let mut values = [all; 12];
+    values[joint] = value;
+    values
+}
+
+/// A step of a random run: counts, or for some joints something absurd, and a command.
+fn steps() -> impl Strategy<Value = Vec<([i32; 12], Option<i32>, Option<Command>)>> {
+    let walk = proptest::array::uniform12(-40..=40_i32);
+    let absurd = proptest::option::weighted(0.01, any::<i32>());
+    let command = proptest::option::weighted(0.1, proptest::sample::select(&Command::ALL[..]));
+    proptest::collection::vec((walk, absurd, command), 1..400)
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(200))]
+
+    #[test]
+    fn whatever_comes_torques_stay_within_their_limits(steps in steps(), start in any::<i32>(), relaxed in any::<bool>()) {
+        let mut config = config();
+        config.law.force_n = 200.0;
+        for encoder in &mut config.estimator.encoders {
+            encoder.zero_count = start;
+        }
+        if relaxed {
+            config.faults = FaultConfig::LEAST;
+        }
+        let params: TestParams = params(&config);
+        let mut state = TestState::new();
+        let mut counts = facing_counts::<12>().map(|count| count.wrapping_add(start));
+        let mut last = [0.0_f32; 12];
+        for (walk, absurd, command) in steps {
+            for (count, walk) in counts.iter_mut().zip(walk) {
+                *count = count.wrapping_add(walk);
+            }
+            if let Some(absurd) = absurd {
+                counts[3] = absurd;
+            }
+            let output = tick(&params, &mut state, &counts, command);
+            let off = matches!(output.record.mode, Mode::Disarmed | Mode::Fault);
+            for (torque, last) in output.torques_nm.into_iter().zip(last) {
+                prop_assert!(torque.abs() <= TORQUE_NM as f32);
+                // Either off, or within the slew limit, up to the rounding of a sum.
+                let steady = (torque - last).abs() <= 1e-3 * SLEW_NM_S as f32 + 1e-6;
+                prop_assert!(steady && !off || torque == 0.0);
+            }
+            prop_assert_eq!(output.record.answer.map(|answer| answer.command), command);
+            prop_assert_eq!(output.record.fault.is_some(), output.record.mode == Mode::Fault);
+            last = output.torques_nm;
+        }
+    }
+
+    #[test]
+    fn whatever_angles_come_no_torque_is_not_finite(
+        angles in proptest::array::uniform12(any::<f32>()),
+        speeds in proptest::array::uniform12(any::<f32>()),
+        scale in 0.0_f32..1.0,
+    ) {
+        // All floats there are, and tame ones.
+        for scale in [1.0, scale * 1e-35] {
+            let config = Config { limits: LimitConfig::NONE, faults: FaultConfig::LEAST, ..config() };
+            let params: TestParams = params(&config);
+            let mut state = in_mode(&params, Mode::Grasping);
+            let output = tick_with(&params, &mut state, &angles.map(|a| a * scale), &speeds.map(|s| s * scale), None);
+            prop_assert!(output.torques_nm.iter().all(|torque| torque.is_finite()));
+        }
+    }
+}

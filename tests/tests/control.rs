@@ -1,0 +1,427 @@
+//! The grasp law against the paper's formulas as they are printed: Eqs. 30-34 and 59 for the torques, Eqs. 43 and 44 for the
+//! potentials.
+
+use blindgrasp_shared::control::{GraspConfig, GraspLaw, Grip, Latch};
+use blindgrasp_shared::hand::{Hand, Posture, Wrench};
+use blindgrasp_tests::description::{Description, Placed};
+use blindgrasp_tests::numeric::{Errors, derivative};
+use blindgrasp_tests::random::Draw;
+use nalgebra::{Matrix3, Vector3};
+
+const JOINTS: usize = 30;
+const FINGERS: usize = 5;
+const FORCE_N: f64 = 5.0;
+const K_ST_NM: f64 = 0.3;
+
+type RandomHand = Hand<f64, JOINTS, FINGERS>;
+type Torques = [f64; JOINTS];
+
+/// A random hand somewhere after its latch, with the law prepared for it.
+struct Case {
+    draw: Draw,
+    description: Description,
+    hand: RandomHand,
+    law: GraspLaw<f64, JOINTS>,
+    damping: Torques,
+    gravity: Vector3<f64>,
+    angles: Torques,
+    speeds: Torques,
+    /// Joint angles when the grasp began.
+    latched: Torques,
+}
+
+fn cases(seed: u64, count: usize) -> impl Iterator<Item = Case> {
+    let mut draw = Draw::new(seed);
+    (0..count).map(move |k| Case::of(draw.hand(k % 2 == 0), Draw::new(seed + 1 + k as u64)))
+}
+
+impl Case {
+    fn of(description: Description, mut draw: Draw) -> Self {
+        let hand: RandomHand = description.hand();
+        let latched = draw.joints::<JOINTS>(2.0);
+        let moved = draw.joints::<JOINTS>(0.7);
+        let damping = draw.joints::<JOINTS>(0.1).map(f64::abs);
+        let gravity = draw.vector(9.81);
+        let law = law(&hand, K_ST_NM, &damping, &gravity);
+        Self {
+            angles: std::array::from_fn(|k| latched[k] + moved[k]),
+            speeds: draw.joints(2.0),
+            latched,
+            damping,
+            gravity,
+            law,
+            hand,
+            description,
+            draw,
+        }
+    }
+
+    fn posture(&self, angles: &Torques) -> Posture<f64, JOINTS, FINGERS> {
+        let mut posture = Posture::at_base();
+        self.hand.forward_kinematics(angles, &mut posture);
+        posture
+    }
+
+    fn latch(&self) -> Latch<f64, FINGERS> {
+        Latch::of(&self.posture(&self.latched))
+    }
+
+    /// Torques at some speeds, with shares of the force and of the attitudes' stiffness.
+    fn torques(&self, speeds: &Torques, shares: (f64, f64)) -> Torques {
+        let latch = self.latch();
+        let grip = Grip { latch: &latch, force_share: shares.0, attitude_share: shares.1 };
+        self.law.torques(&self.hand, &self.posture(&self.angles), speeds, Some(grip)).0
+    }
+
+    /// A potential's gradient along each joint, by differences.
+    ///
+    /// A fingertip's centre and attitude are first-degree in the sine and cosine of one joint, the potentials
+    /// second-degree: truncation is at most `2^5 step^4 / 480` = 1e-12 of them, rounding 1e-16 / step = 5e-14.
+    fn gradient(&self, potential: impl Fn(&Placed) -> f64) -> Vec<f64> {
+        let at = |k: usize, by: f64| {
+            let mut angles = self.angles;
+            angles[k] += by;
+            potential(&self.description.placed(&angles))
+        };
+        (0..self.hand.joint_count()).map(|k| derivative(1.0 / 512.0, |by| at(k, by))).collect()
+    }
+
+    /// Fingertip attitudes in frames of the test's own choice: the description's link frames, turned by constants.
+    fn tip_frames(&self, offsets: &[Matrix3<f64>], angles: &Torques) -> Vec<Matrix3<f64>> {
+        self.frames_of(offsets, &self.description.placed(angles))
+    }
+
+    fn frames_of(&self, offsets: &[Matrix3<f64>], placed: &Placed) -> Vec<Matrix3<f64>> {
+        let tips = self.description.fingertips.iter().zip(offsets);
+        tips.map(|(tip, offset)| placed.attitudes[tip.link] * offset).collect()
+    }
+
+    fn offsets(&mut self) -> Vec<Matrix3<f64>> {
+        self.description.fingertips.iter().map(|_| self.draw.rotation()).collect()
+    }
+
+    /// `V_s` as printed in Eq. 43.
+    fn approach_potential(&self, placed: &Placed) -> f64 {
+        let centres = &placed.centres_m;
+        let mut sum = 0.0;
+        for a in centres {
+            for b in centres {
+                sum += (a - b).norm_squared();
+            }
+        }
+        self.stiffness() / (4.0 * centres.len() as f64) * sum
+    }
+
+    /// `V_st` as printed in Eq. 44, with the relative attitudes of Eq. 59.
+    fn attitude_potential(&self, now: &[Matrix3<f64>], then: &[Matrix3<f64>]) -> f64 {
+        let n = now.len();
+        let mut sum = 0.0;
+        for i in 0..n {
+            let j = (i + 1) % n;
+            let relative = then[j].transpose() * then[i];
+            sum += (now[i].transpose() * now[j] * relative).trace();
+        }
+        -K_ST_NM * sum
+    }
+
+    /// `A = f_d / sum(r)`.
+    fn stiffness(&self) -> f64 {
+        FORCE_N / self.description.fingertips.iter().map(|tip| tip.radius_m).sum::<f64>()
+    }
+
+    /// The most that the approach could put on a joint, N m: every fingertip's force at the end of the longest lever.
+    fn approach_scale(&self) -> f64 {
+        let reach = (0..self.hand.fingertip_count()).map(|i| self.description.reach_m(i)).fold(0.0, f64::max);
+        let forces = self.law.approach_wrenches(&self.hand, &self.posture(&self.angles));
+        reach * forces.iter().map(|wrench| wrench.force_n.norm()).sum::<f64>()
+    }
+
+    /// The most that the links could weigh on a joint, N m.
+    fn weight_scale(&self) -> f64 {
+        let reach = (0..self.hand.fingertip_count()).map(|i| self.description.reach_m(i)).fold(0.0, f64::max);
+        self.description.joints.iter().map(|joint| joint.link.mass_kg).sum::<f64>()
+            * self.gravity.norm()
+            * reach
+    }
+}
+
+fn law(hand: &RandomHand, k_st: f64, damping: &Torques, gravity: &Vector3<f64>) -> GraspLaw<f64, JOINTS> {
+    let config = GraspConfig {
+        force_n: FORCE_N,
+        attitude_stiffness_nm: k_st,
+        damping_nm_s: *damping,
+        gravity_m_s2: Some(*gravity),
+    };
+    config.prepare(hand).expect("the gains are good")
+}
+
+/// Eq. 30 is the gradient of Eq. 43, with damping and the weight of the links beside it.
+///
+/// Tolerance: 1e-10 of the largest torque that it could be: the differences err by 1e-12, see [`Case::gradient`].
+#[test]
+fn the_approach_is_the_negative_gradient_of_its_potential() {
+    let (mut errors, mut potentials) = (Errors::new(), Errors::new());
+    for case in cases(1000, 300) {
+        let gradient = case.gradient(|placed| case.approach_potential(placed));
+        let torques = case.torques(&case.speeds, (1.0, 0.0));
+        let weight = case.gradient(|placed| case.description.weight_potential_j(placed, &case.gravity));
+        let scale = case.approach_scale() + case.weight_scale();
+        for k in 0..case.hand.joint_count() {
+            errors.add((torques[k] + gradient[k] + case.damping[k] * case.speeds[k] - weight[k]) / scale);
+        }
+        let latch = case.latch();
+        let grip = Grip { latch: &latch, force_share: 1.0, attitude_share: 0.0 };
+        let monitor = case.law.torques(&case.hand, &case.posture(&case.angles), &case.speeds, Some(grip)).1;
+        let potential = case.approach_potential(&case.description.placed(&case.angles));
+        potentials.add((monitor.approach_potential_j - potential) / case.approach_scale());
+    }
+    println!("u_s against the gradient of Eq. 43: {errors}; V_s: {potentials}");
+    assert!(errors.largest() < 1e-10);
+    // The same sum in two orders, of at most 25 terms.
+    assert!(potentials.largest() < 1e-14);
+}
+
+/// Eq. 32 is the gradient of Eq. 44, in fingertip frames that the law does not know.
+///
+/// Tolerance: 1e-10 of `2 N K_st`: the differences err by 1e-12, see [`Case::gradient`].
+#[test]
+fn the_relative_attitudes_are_the_negative_gradient_of_their_potential() {
+    let (mut errors, mut potentials) = (Errors::new(), Errors::new());
+    for mut case in cases(2000, 300) {
+        let n = case.hand.fingertip_count() as f64;
+        let offsets = case.offsets();
+        let then = case.tip_frames(&offsets, &case.latched);
+        let gradient =
+            case.gradient(|placed| case.attitude_potential(&case.frames_of(&offsets, placed), &then));
+        let still = [0.0; JOINTS];
+        let (with, without) = (case.torques(&still, (0.0, 1.0)), case.torques(&still, (0.0, 0.0)));
+        for k in 0..case.hand.joint_count() {
+            errors.add((with[k] - without[k] + gradient[k]) / (2.0 * n * K_ST_NM));
+        }
+        let latch = case.latch();
+        let grip = Grip { latch: &latch, force_share: 1.0, attitude_share: 1.0 };
+        let monitor = case.law.torques(&case.hand, &case.posture(&case.angles), &case.speeds, Some(grip)).1;
+        // The law's has the constant that makes it zero at the latch.
+        let expected =
+            case.attitude_potential(&case.tip_frames(&offsets, &case.angles), &then) + 3.0 * n * K_ST_NM;
+        potentials.add((monitor.attitude_potential_j - expected) / (3.0 * n * K_ST_NM));
+        assert!(monitor.attitude_potential_j >= 0.0);
+    }
+    println!("u_st against the gradient of Eq. 44: {errors}; V_st: {potentials}");
+    assert!(errors.largest() < 1e-10);
+    // Traces of products of rotations after chains of ten joints.
+    assert!(potentials.largest() < 1e-13);
+}
+
+/// `B_sti` of Eqs. 32 and 38 as printed: three cross products of the columns of `R_fi` with those of
+/// `R_fi,(i-1)d + R_fi,(i+1)d`, where `R_fi,jd = R_fj R_fj,ini^T R_fi,ini` (Eqs. 34 and 59).
+fn printed_moments(now: &[Matrix3<f64>], then: &[Matrix3<f64>]) -> Vec<Vector3<f64>> {
+    let n = now.len();
+    (0..n)
+        .map(|i| {
+            let desired = |j: usize| now[j] * (then[j].transpose() * then[i]);
+            let sum = desired((i + n - 1) % n) + desired((i + 1) % n);
+            (0..3).map(|c| now[i].column(c).cross(&sum.column(c))).sum()
+        })
+        .collect()
+}
+
+/// The law's shortcut through turns since the latch is Eq. 32 as it is printed, in any fingertip frames: two fingers, who are
+/// neighbours twice, included.
+///
+/// Tolerance: 1e-14 of `K_st` for a moment in the same frames: it is a sum of 18 products of numbers below one, of
+/// matrices that are rounded once; 1e-13 for frames of a second forward kinematics, which differ after chains of ten joints.
+#[test]
+fn moments_are_those_of_the_print() {
+    let (mut same, mut other) = (Errors::new(), Errors::new());
+    let mut pairs = 0;
+    for mut case in cases(3000, 1000) {
+        let moments = case.law.attitude_wrenches(&case.hand, &case.posture(&case.angles), &case.latch());
+        let (now, then) = (case.posture(&case.angles), case.posture(&case.latched));
+        let n = case.hand.fingertip_count();
+        pairs += usize::from(n == 2);
+        for (wrench, printed) in
+            moments.iter().zip(printed_moments(&now.attitudes[..n], &then.attitudes[..n]))
+        {
+            assert_eq!(wrench.force_n, Vector3::zeros());
+            same.add((wrench.moment_nm / K_ST_NM - printed).norm());
+        }
+        let offsets = case.offsets();
+        let (now, then) = (case.tip_frames(&offsets, &case.angles), case.tip_frames(&offsets, &case.latched));
+        for (wrench, printed) in moments.iter().zip(printed_moments(&now, &then)) {
+            other.add((wrench.moment_nm / K_ST_NM - printed).norm());
+        }
+    }
+    println!(
+        "B_st as printed, in the law's frames: {same}; in others: {other}; {pairs} hands of two fingers"
+    );
+    assert!(same.largest() < 1e-14);
+    assert!(other.largest() < 1e-13);
+    assert!(pairs > 100);
+}
+
+/// Two fingers have each other as both neighbours, and Eq. 32 counts them twice: the moment that aligns finger 1 with finger 2
+/// is `2 K_st` times the sum of three cross products, `4 K_st sin(a)` for a relative turn by `a`.
+#[test]
+fn two_fingers_are_neighbours_twice() {
+    let mut draw = Draw::new(4000);
+    let description = loop {
+        let hand = draw.hand(false);
+        if hand.fingertips.len() == 2 {
+            break hand;
+        }
+    };
+    let mut case = Case::of(description, draw);
+    // Only the first joint of the first finger has moved: the turn is by its angle about its axis.
+    case.angles = case.latched;
+    case.angles[0] += 0.4;
+    let posture = case.posture(&case.angles);
+    let wrenches = case.law.attitude_wrenches(&case.hand, &posture, &case.latch());
+    let expected =
+        posture.links[0].axis() * (-4.0 * K_ST_NM * blindgrasp_shared::math::Real::sine_cosine(0.4).0);
+    // A few roundings of numbers of the size of `4 K_st`.
+    assert!((wrenches[0].moment_nm - expected).norm() < 1e-14, "{} {expected}", wrenches[0].moment_nm);
+    assert!((wrenches[1].moment_nm + expected).norm() < 1e-14);
+}
+
+/// What each term puts on the fingertips sums to no force and no moment, about any point; so joints that carry all fingertips feel
+/// only their damping and the weight of the links.
+///
+/// Tolerance: 1e-14 of the sum of the magnitudes, for sums of up to five terms; the trunk's torques, through chains of ten joints,
+/// 1e-13 of the largest torque that they could be.
+#[test]
+fn a_trunk_feels_neither_term() {
+    let (mut forces, mut moments, mut trunks) = (Errors::new(), Errors::new(), Errors::new());
+    for mut case in cases(5000, 500) {
+        let (posture, latch) = (case.posture(&case.angles), case.latch());
+        let n = case.hand.fingertip_count();
+        let about = case.draw.vector(0.5);
+        for wrenches in [
+            case.law.approach_wrenches(&case.hand, &posture),
+            case.law.attitude_wrenches(&case.hand, &posture, &latch),
+        ] {
+            let moment_of = |i: usize, wrench: &Wrench<f64>| {
+                wrench.moment_nm + (posture.centres_m[i] - about).cross(&wrench.force_n)
+            };
+            let (mut force, mut moment) = (Vector3::zeros(), Vector3::zeros());
+            let (mut force_scale, mut moment_scale) = (0.0, 0.0);
+            for (i, wrench) in wrenches.iter().enumerate() {
+                assert!(i < n || *wrench == Wrench::zero(), "a fingertip that is not there");
+                force += wrench.force_n;
+                moment += moment_of(i, wrench);
+                force_scale += wrench.force_n.norm();
+                moment_scale +=
+                    wrench.moment_nm.norm() + (posture.centres_m[i] - about).norm() * wrench.force_n.norm();
+            }
+            forces.add(force.norm() / force_scale.max(f64::MIN_POSITIVE));
+            moments.add(moment.norm() / moment_scale);
+        }
+        let torques = case.torques(&case.speeds, (1.0, 1.0));
+        let weight = case.hand.gravity_torques(&posture, &case.gravity);
+        let scale = case.approach_scale() + case.weight_scale() + 2.0 * n as f64 * K_ST_NM;
+        for k in (0..case.hand.joint_count()).filter(|&k| (0..n).all(|i| case.hand.moves(k, i))) {
+            trunks.add((torques[k] - (weight[k] - case.damping[k] * case.speeds[k])) / scale);
+        }
+    }
+    println!("sum of forces {forces}; of moments {moments}; trunk joints {trunks}");
+    assert!(forces.largest() < 1e-14 && moments.largest() < 1e-14);
+    assert!(trunks.largest() < 1e-13);
+}
+
+/// The law does not care where the hand stands: on a base that is turned and shifted (with gravity turned too) the same
+/// joint angles give the same torques.
+///
+/// Tolerance: 1e-12 of the largest torque that they could be: the shift, of up to a metre, is added to every position and taken from
+/// it again, which costs digits.
+#[test]
+fn torques_are_the_same_wherever_the_hand_stands() {
+    let mut errors = Errors::new();
+    for mut here in cases(6000, 300) {
+        let (turn, shift) = (here.draw.rotation(), here.draw.vector(1.0));
+        let description = here.description.moved(&turn, &shift);
+        let hand: RandomHand = description.hand();
+        let gravity = turn * here.gravity;
+        let law = law(&hand, K_ST_NM, &here.damping, &gravity);
+        let there = Case { law, hand, gravity, description, draw: Draw::new(0), ..here };
+        let scale = here.approach_scale() + here.weight_scale() + K_ST_NM;
+        let (a, b) = (here.torques(&here.speeds, (1.0, 1.0)), there.torques(&there.speeds, (1.0, 1.0)));
+        for k in 0..here.hand.joint_count() {
+            errors.add((a[k] - b[k]) / scale);
+        }
+    }
+    println!("torques on a moved base, relative: {errors}");
+    assert!(errors.largest() < 1e-12);
+}
+
+/// At the latch `u_st` and its potential are zero.
+///
+/// Tolerances, in `K_st`: 1e-15 for the moments, because `R R^T` comes out symmetric, so that its deviation from one has no
+/// axial part; 1e-13 for the potential, because at the end of a chain of ten joints `R R^T` is one to about 1e-15 only, and
+/// fifteen diagonal entries are summed.
+#[test]
+fn nothing_pulls_at_the_attitudes_at_the_latch() {
+    let (mut moments, mut potentials) = (Errors::new(), Errors::new());
+    for mut case in cases(7000, 300) {
+        case.angles = case.latched;
+        let (posture, latch) = (case.posture(&case.angles), case.latch());
+        for wrench in case.law.attitude_wrenches(&case.hand, &posture, &latch) {
+            moments.add(wrench.moment_nm.norm() / K_ST_NM);
+        }
+        let grip = Grip { latch: &latch, force_share: 1.0, attitude_share: 1.0 };
+        let monitor = case.law.torques(&case.hand, &posture, &case.speeds, Some(grip)).1;
+        potentials.add(monitor.attitude_potential_j / K_ST_NM);
+    }
+    println!("at the latch: B_st {moments}; V_st {potentials}");
+    assert!(moments.largest() < 1e-15);
+    assert!(potentials.largest() < 1e-13);
+}
+
+/// Without `K_st` the law is `u_s` alone, to the last bit, whatever the latch; without a grip it only damps and carries.
+#[test]
+fn normal_only_knows_no_latch() {
+    for mut case in cases(8000, 100) {
+        let normal_only = law(&case.hand, 0.0, &case.damping, &case.gravity);
+        let posture = case.posture(&case.angles);
+        let latches = [case.latch(), Latch::of(&posture)];
+        let approach = case.torques(&case.speeds, (1.0, 0.0));
+        for latch in &latches {
+            let grip = Grip { latch, force_share: 1.0, attitude_share: 1.0 };
+            let (torques, monitor) = normal_only.torques(&case.hand, &posture, &case.speeds, Some(grip));
+            assert_eq!(torques, approach);
+            assert_eq!(monitor.attitude_potential_j, 0.0);
+        }
+        let mut wrenches = case.law.approach_wrenches(&case.hand, &posture);
+        let expected = case.hand.joint_torques(&posture, &wrenches, Some(&case.gravity));
+        let still = normal_only.torques(
+            &case.hand,
+            &posture,
+            &[0.0; JOINTS],
+            Some(Grip { latch: &latches[0], force_share: 1.0, attitude_share: 1.0 }),
+        );
+        assert_eq!(still.0, expected);
+        wrenches = [Wrench::zero(); FINGERS];
+        let released = case.law.torques(&case.hand, &posture, &[0.0; JOINTS], None).0;
+        assert_eq!(released, case.hand.joint_torques(&posture, &wrenches, Some(&case.gravity)));
+        case.speeds = [0.0; JOINTS];
+        assert_eq!(case.torques(&case.speeds, (0.0, 0.0)), released);
+    }
+}
+
+/// Shares scale their terms, so that the soft start is a soft start.
+///
+/// Tolerance: 1e-13 of the largest torque that they could be: the same products in another order.
+#[test]
+fn shares_scale_their_terms() {
+    let mut errors = Errors::new();
+    for case in cases(9000, 100) {
+        let still = [0.0; JOINTS];
+        let [none, force, attitude, both] =
+            [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (0.3, 0.6)].map(|shares| case.torques(&still, shares));
+        for k in 0..case.hand.joint_count() {
+            let expected = none[k] + 0.3 * (force[k] - none[k]) + 0.6 * (attitude[k] - none[k]);
+            errors.add((both[k] - expected) / (case.approach_scale() + case.weight_scale() + K_ST_NM));
+        }
+    }
+    println!("shares: {errors}");
+    assert!(errors.largest() < 1e-13);
+}
