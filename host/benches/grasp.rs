@@ -80,7 +80,7 @@ fn controller(criterion: &mut Criterion) {
     let mut buffer = [0; 512];
     let record = tick(&params, &mut state, &counts, None).record;
     criterion.bench_function("encode a record (12 joints)", |bencher| {
-        bencher.iter(|| black_box(&record).encode(&mut buffer).map(<[u8]>::len));
+        bencher.iter(|| black_box(&record).encode(&mut buffer).map(|bytes| bytes.len()));
     });
 }
 

@@ -13,5 +13,6 @@ pub type Posture = blindgrasp_shared::hand::Posture<f64, MAX_JOINTS, MAX_FINGERS
 
 pub mod plant;
 pub mod record;
+pub mod report;
 pub mod scene;
 pub mod sim;

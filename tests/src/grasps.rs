@@ -57,7 +57,8 @@ pub fn cube() -> Held {
     Held::centred(Polyhedron::cuboid([SIDE_M; 3]).expect("the cube is a cuboid"), 0.0021, &[2, 1, 0])
 }
 
-/// The prism of Table VI: one finger on each side, a few millimetres off the middle, so that it has to find its balance.
+/// The prism of Table VI: one finger on each side, a few millimetres off the middle, so that it has to find its
+/// balance.
 pub fn prism() -> Held {
     let shape = Polyhedron::regular_prism(3, 0.060, 0.039).expect("the prism is one");
     let mut held = Held::centred(shape, 0.0015, &[0, 1, 2]);
@@ -102,6 +103,14 @@ impl Grasp {
     /// # Panics
     /// If a finger can't reach its point.
     pub fn new(description: Description, held: &Held) -> Self {
+        Self::with_fingertips(description, held, FINGERTIP)
+    }
+
+    /// The same with fingertips of another material.
+    ///
+    /// # Panics
+    /// If a finger can't reach its point.
+    pub fn with_fingertips(description: Description, held: &Held, fingertip: FingertipModel) -> Self {
         let hand: Hand = description.hand();
         let trunk = hand.joint_count() - FINGER_JOINTS * hand.fingertip_count();
         let damping_nm_s = std::array::from_fn(|k| match k.checked_sub(trunk) {
@@ -117,12 +126,12 @@ impl Grasp {
         let law = config.prepare(&hand).expect("the gains of Table VII are good");
         let faces =
             held.contacts.iter().map(|&(face, _)| face_contact(&held.shape, face)).collect::<Vec<_>>();
-        let centres = equilibrium_centres(held, &faces, law.approach_stiffness_n_m());
+        let centres = equilibrium_centres(held, &faces, &fingertip, law.approach_stiffness_n_m());
         let angles_rad = reach(&hand, trunk, &centres);
         let mut posture = Posture::at_base();
         hand.forward_kinematics(&angles_rad, &mut posture);
         let model = PlantModel {
-            fingertips: vec![FINGERTIP; hand.fingertip_count()],
+            fingertips: vec![fingertip; hand.fingertip_count()],
             friction: vec![JointFriction::default(); hand.joint_count()],
             hand,
             object: ObjectModel {
@@ -213,18 +222,23 @@ pub fn face_contact(shape: &Polyhedron, face: usize) -> FaceContact {
 
 /// Fingertip centres in the base frame over the points of contact, with the indentations at which `k dr^2` is the
 /// normal part of the law's pull (Eq. 57).
-fn equilibrium_centres(held: &Held, faces: &[FaceContact], stiffness_n_m: f64) -> Vec<Vector3<f64>> {
+fn equilibrium_centres(
+    held: &Held,
+    faces: &[FaceContact],
+    fingertip: &FingertipModel,
+    stiffness_n_m: f64,
+) -> Vec<Vector3<f64>> {
     let mut pressed = vec![0.0; faces.len()];
     let mut centres = vec![Vector3::zeros(); faces.len()];
     // Each round shrinks the error by the ratio of the law's stiffness to the fingertip's, about 1/50.
     for _ in 0..30 {
         for (k, (face, (_, point))) in faces.iter().zip(&held.contacts).enumerate() {
-            centres[k] = point - face.frame.column(1) * (FINGERTIP.radius_m - pressed[k]);
+            centres[k] = point - face.frame.column(1) * (fingertip.radius_m - pressed[k]);
         }
         let centroid = centres.iter().sum::<Vector3<f64>>() / centres.len() as f64;
         for (k, face) in faces.iter().enumerate() {
             let force = stiffness_n_m * face.frame.column(1).dot(&(centroid - centres[k]));
-            pressed[k] = (force / FINGERTIP.stiffness_n_m2).square_root();
+            pressed[k] = (force / fingertip.stiffness_n_m2).square_root();
         }
     }
     centres.iter().map(|centre| held.position_m + held.attitude * centre).collect()

@@ -57,8 +57,8 @@ pub fn fingers(azimuths_rad: &[f64]) -> Description {
     hand
 }
 
-/// A hand on an arm of three joints, which all are at a right angle to each other. With the arm at zero the hand is where
-/// it was; the arm's joints come first.
+/// A hand on an arm of three joints, which all are at a right angle to each other. With the arm at zero the hand is
+/// where it was; the arm's joints come first.
 pub fn on_arm(hand: &Description) -> Description {
     let bones_m = [Vector3::new(0.0, 0.1, -0.3), Vector3::new(0.0, 0.0, 0.2), Vector3::new(0.0, -0.1, 0.1)];
     let mut whole = Description::default();
@@ -83,6 +83,20 @@ pub fn on_arm(hand: &Description) -> Description {
         }),
     );
     whole.fingertips.extend(hand.fingertips.iter().map(|tip| Fingertip { link: tip.link + arm, ..*tip }));
+    whole
+}
+
+/// The same, but the last finger stands on the arm's first link, so that the arm's other joints move some fingers only.
+pub fn on_forked_arm(hand: &Description) -> Description {
+    let mut whole = on_arm(hand);
+    let arm = whole.joints.len() - hand.joints.len();
+    let to_palm = whole.joints[1..arm].iter().map(|joint| joint.offset_m).sum::<Vector3<f64>>();
+    let last = whole.fingertips[whole.fingertips.len() - 1].link;
+    let base = whole.chain(last).find(|&k| whole.joints[k].parent == Some(arm - 1));
+    if let Some(base) = base {
+        whole.joints[base].parent = Some(0);
+        whole.joints[base].offset_m += to_palm;
+    }
     whole
 }
 

@@ -6,9 +6,11 @@
 //! - [`hands`]: the paper's three-fingered hand, and the same hand on an arm.
 //! - [`grasps`]: a hand, an object, a plant and the grasp law, ready to run.
 //! - [`numeric`]: derivatives by differences, and the largest of many errors.
+//! - [`polyhedra`]: random convex polyhedra, and scenes in which the hand grasps them.
 
 pub mod description;
 pub mod grasps;
 pub mod hands;
 pub mod numeric;
+pub mod polyhedra;
 pub mod random;

@@ -6,8 +6,8 @@ use std::ops::{Add, Mul, Sub};
 
 /// Derivative of `f` at zero: central differences at `step` and `step / 2`, extrapolated (Richardson).
 ///
-/// The truncation error is `step^4 / 480` times the fifth derivative; the rounding error is about three times that of `f`
-/// divided by `step`.
+/// The truncation error is `step^4 / 480` times the fifth derivative; the rounding error is about three times that of
+/// `f` divided by `step`.
 pub fn derivative<T>(step: f64, f: impl Fn(f64) -> T) -> T
 where
     T: Add<Output = T> + Sub<Output = T> + Mul<f64, Output = T>,

@@ -51,8 +51,9 @@ impl Draw {
         rodrigues(&self.unit(), angle)
     }
 
-    /// Inertia about the mass centre (kg m^2) of a body of a mass that spreads over about `size_m`. It is that of a real
-    /// distribution of mass, so that it is positive definite and obeys the triangle inequality, with strict signs.
+    /// Inertia about the mass centre (kg m^2) of a body of a mass that spreads over about `size_m`. It is that of a
+    /// real distribution of mass, so that it is positive definite and obeys the triangle inequality, with strict
+    /// signs.
     pub fn inertia(&mut self, mass_kg: f64, size_m: f64) -> Matrix3<f64> {
         let turn = self.rotation();
         let spread = Vector3::from_fn(|_, _| {
@@ -71,8 +72,8 @@ impl Draw {
 
     /// A hand of two to five fingers with one to five joints each; with a trunk, one to five joints carry them all.
     ///
-    /// Links are up to 0.1 m long in each direction. Some axes are parallel to their neighbour's or lie along a coordinate
-    /// axis, and some inner links have no mass, as in real descriptions.
+    /// Links are up to 0.1 m long in each direction. Some axes are parallel to their neighbour's or lie along a
+    /// coordinate axis, and some inner links have no mass, as in real descriptions.
     pub fn hand(&mut self, trunk: bool) -> Description {
         let mut hand = Description::default();
         let mut last = None;

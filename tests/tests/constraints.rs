@@ -1,5 +1,5 @@
-//! Rolling constraints and contact forces: against material points followed from scratch, against the equations of motion
-//! (Eqs. 19-21), against a dense system of them; and a held object that stays where it is.
+//! Rolling constraints and contact forces: against material points followed from scratch, against the equations of
+//! motion (Eqs. 19-21), against a dense system of them; and a held object that stays where it is.
 
 use blindgrasp::plant::contact::Contact;
 use blindgrasp::plant::dynamics::{Body, JointVector, bias_torques, mass_matrix, place_bodies};
@@ -7,18 +7,19 @@ use blindgrasp::plant::friction::JointFriction;
 use blindgrasp::plant::{ContactForce, Motion, Plant};
 use blindgrasp::{MAX_JOINTS, Posture};
 use blindgrasp_tests::grasps::{FRICTION, Grasp, cube, prism};
-use blindgrasp_tests::hands::{on_arm, three_finger};
+use blindgrasp_tests::hands::{on_arm, on_forked_arm, three_finger};
 use blindgrasp_tests::numeric::{Errors, order};
 use blindgrasp_tests::random::Draw;
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 
-/// Cube and prism, held by the hand and by the hand on an arm.
+/// Cube and prism, held by the hand and by the hand on arms.
 fn grasps() -> Vec<(&'static str, Grasp)> {
     vec![
         ("cube", Grasp::new(three_finger(), &cube())),
         ("prism", Grasp::new(three_finger(), &prism())),
         ("cube on an arm", Grasp::new(on_arm(&three_finger()), &cube())),
         ("prism on an arm", Grasp::new(on_arm(&three_finger()), &prism())),
+        ("prism on a forked arm", Grasp::new(on_forked_arm(&three_finger()), &prism())),
     ]
 }
 
@@ -35,8 +36,8 @@ fn disturbed(grasp: &Grasp, draw: &mut Draw, shift: f64, speed: f64) -> Motion {
     motion
 }
 
-/// Largest difference along the face between the velocities of the two material points at each point of contact, m/s: the one of the
-/// fingertip's link and the one of the object.
+/// Largest difference along the face between the velocities of the two material points at each point of contact, m/s:
+/// the one of the fingertip's link and the one of the object.
 fn slip_from_scratch(grasp: &Grasp, motion: &Motion) -> f64 {
     let hand = &grasp.description;
     let placed = hand.placed(&motion.angles_rad[..hand.joints.len()]);
@@ -55,8 +56,8 @@ fn slip_from_scratch(grasp: &Grasp, motion: &Motion) -> f64 {
     largest
 }
 
-/// The rolling constraints hold at every step: `|P v|` of the plant, and the velocities of both material points, computed
-/// from the description alone.
+/// The rolling constraints hold at every step: `|P v|` of the plant, and the velocities of both material points,
+/// computed from the description alone.
 ///
 /// Tolerance: 1e-10 m/s, for speeds up to 0.1 m/s.
 #[test]
@@ -102,7 +103,8 @@ fn random_velocities_are_projected_onto_the_constraints() {
     }
 }
 
-/// The equations of motion of hand and object at one instant, dense, as Eqs. 19-23 have them. Velocities are `(dq, dx, w)`.
+/// The equations of motion of hand and object at one instant, dense, as Eqs. 19-23 have them. Velocities are `(dq,
+/// dx, w)`.
 struct Equations {
     /// `G = diag(H, M, I)`.
     mass: DMatrix<f64>,
@@ -221,8 +223,9 @@ impl Equations {
 /// `f = k dr^2 + xi Q v + tau 2 k dr Q (v - v0)` (stiffness averaged over the positions around it). Positions then move
 /// with `v` for a whole step, which shows it.
 ///
-/// Tolerance: forces 1e-10 of the largest, for rounding of 1e-16 and a dense system whose condition is about 1e6. Velocities 1e-10 (rad/s, m/s), because positions of up to 2 rad are rounded to 2e-16 and divided by a
-/// step of at least 5e-5 s.
+/// Tolerance: forces 1e-10 of the largest, for rounding of 1e-16 and a dense system whose condition is about 1e6.
+/// Velocities 1e-10 (rad/s, m/s), because positions of up to 2 rad are rounded to 2e-16 and divided by a step of at
+/// least 5e-5 s.
 #[test]
 fn the_solver_agrees_with_a_dense_system() {
     let mut draw = Draw::new(20);
@@ -292,12 +295,13 @@ fn the_solver_agrees_with_a_dense_system() {
     }
 }
 
-/// Accelerations as differences of the velocities of neighbouring steps, `(v(t + h) - v(t - h)) / 2h`, satisfy Eqs. 19-21
-/// with the multipliers, normal forces and torsion that the plant reports for `t`.
+/// Accelerations as differences of the velocities of neighbouring steps, `(v(t + h) - v(t - h)) / 2h`, satisfy Eqs.
+/// 19-21 with the multipliers, normal forces and torsion that the plant reports for `t`.
 ///
 /// Both the differences and the forces err by `h^2`, so that the residual falls by four when the step is halved.
 ///
-/// Tolerance: order at least 1.9 of the largest residual over 50 ms of a moving grasp, over a factor of four in the step.
+/// Tolerance: order at least 1.9 of the largest residual over 50 ms of a moving grasp, over a factor of four in the
+/// step.
 #[test]
 fn multipliers_satisfy_the_equations_of_motion() {
     for (name, grasp) in grasps() {
@@ -350,10 +354,13 @@ fn drift_m(grasp: &Grasp, before: &Motion, after: &Motion) -> f64 {
 
 /// A held object does not creep: joints with friction, at rest, under torques that no longer change.
 ///
-/// The cube's tangential forces are a third of the normal ones, and stay so. What is left after the grasp is the torsion of the soft
-/// fingertips, which gives way slowly (Eq. 15) to the springs of the joints that stick: an exponential with a time constant of
-/// `b / K` of about 1.4 s that ends at rest. Creep would be a drift that does not end. So: after twelve seconds the drift is below
-/// 1 nm per second, and until it drowns in rounding it is below two thirds of what it was the second before.
+/// The cube's tangential forces are a third of the normal ones, and stay so. What is left after the grasp is the
+/// torsion of the soft fingertips, which gives way slowly (Eq. 15) to the springs of the joints that stick: an
+/// exponential with a time constant `b / K` of 1.4 s for the hand, 2.7 s for the hand on the arm. Creep would be a
+/// drift that does not end.
+///
+/// Tolerances: 1 nm per second from the twelfth second on; after forty seconds 1e-14 m per second, the rounding of
+/// positions of 0.1 m that the relaxation has come down to.
 ///
 /// The same without friction is no rest: constant torques hold an object in an unstable balance.
 #[test]
@@ -369,7 +376,7 @@ fn a_held_object_does_not_creep() {
         grasp.run(&mut plant, 4 * SECOND, |_| {});
         let frozen = grasp.torques(&plant);
         let mut drifts = vec![];
-        for _ in 0..16 {
+        for _ in 0..45 {
             let before = *plant.motion();
             grasp.drive(&mut plant, SECOND, |_| frozen, |_| {});
             drifts.push(drift_m(&grasp, &before, plant.motion()));
@@ -380,7 +387,7 @@ fn a_held_object_does_not_creep() {
         println!("{name}: tangential / normal {tangential:.2}; drift in each second {} m", list.join(" "));
         assert!(tangential > 0.1, "it should be held by friction");
         assert!(drifts[12..].iter().all(|&drift| drift < 1e-9));
-        assert!(drifts.windows(2).all(|pair| pair[1] < pair[0] / 1.5 || pair[1] < 1e-13));
+        assert!(drifts[40..].iter().all(|&drift| drift < 1e-14));
     }
 
     let grasp = Grasp::new(three_finger(), &cube());

@@ -1,5 +1,5 @@
-//! The grasp law against the paper's formulas as they are printed: Eqs. 30-34 and 59 for the torques, Eqs. 43 and 44 for the
-//! potentials.
+//! The grasp law against the paper's formulas as they are printed: Eqs. 30-34 and 59 for the torques, Eqs. 43 and 44
+//! for the potentials.
 
 use blindgrasp_shared::control::{GraspConfig, GraspLaw, Grip, Latch};
 use blindgrasp_shared::hand::{Hand, Posture, Wrench};
@@ -226,11 +226,12 @@ fn printed_moments(now: &[Matrix3<f64>], then: &[Matrix3<f64>]) -> Vec<Vector3<f
         .collect()
 }
 
-/// The law's shortcut through turns since the latch is Eq. 32 as it is printed, in any fingertip frames: two fingers, who are
-/// neighbours twice, included.
+/// The law's shortcut through turns since the latch is Eq. 32 as it is printed, in any fingertip frames: two fingers,
+/// who are neighbours twice, included.
 ///
 /// Tolerance: 1e-14 of `K_st` for a moment in the same frames: it is a sum of 18 products of numbers below one, of
-/// matrices that are rounded once; 1e-13 for frames of a second forward kinematics, which differ after chains of ten joints.
+/// matrices that are rounded once; 1e-13 for frames of a second forward kinematics, which differ after chains of ten
+/// joints.
 #[test]
 fn moments_are_those_of_the_print() {
     let (mut same, mut other) = (Errors::new(), Errors::new());
@@ -260,8 +261,8 @@ fn moments_are_those_of_the_print() {
     assert!(pairs > 100);
 }
 
-/// Two fingers have each other as both neighbours, and Eq. 32 counts them twice: the moment that aligns finger 1 with finger 2
-/// is `2 K_st` times the sum of three cross products, `4 K_st sin(a)` for a relative turn by `a`.
+/// Two fingers have each other as both neighbours, and Eq. 32 counts them twice: the moment that aligns finger 1 with
+/// finger 2 is `2 K_st` times the sum of three cross products, `4 K_st sin(a)` for a relative turn by `a`.
 #[test]
 fn two_fingers_are_neighbours_twice() {
     let mut draw = Draw::new(4000);
@@ -284,11 +285,11 @@ fn two_fingers_are_neighbours_twice() {
     assert!((wrenches[1].moment_nm + expected).norm() < 1e-14);
 }
 
-/// What each term puts on the fingertips sums to no force and no moment, about any point; so joints that carry all fingertips feel
-/// only their damping and the weight of the links.
+/// What each term puts on the fingertips sums to no force and no moment, about any point; so joints that carry all
+/// fingertips feel only their damping and the weight of the links.
 ///
-/// Tolerance: 1e-14 of the sum of the magnitudes, for sums of up to five terms; the trunk's torques, through chains of ten joints,
-/// 1e-13 of the largest torque that they could be.
+/// Tolerance: 1e-14 of the sum of the magnitudes, for sums of up to five terms; the trunk's torques, through chains
+/// of ten joints, 1e-13 of the largest torque that they could be.
 #[test]
 fn a_trunk_feels_neither_term() {
     let (mut forces, mut moments, mut trunks) = (Errors::new(), Errors::new(), Errors::new());
@@ -331,8 +332,8 @@ fn a_trunk_feels_neither_term() {
 /// The law does not care where the hand stands: on a base that is turned and shifted (with gravity turned too) the same
 /// joint angles give the same torques.
 ///
-/// Tolerance: 1e-12 of the largest torque that they could be: the shift, of up to a metre, is added to every position and taken from
-/// it again, which costs digits.
+/// Tolerance: 1e-12 of the largest torque that they could be: the shift, of up to a metre, is added to every position
+/// and taken from it again, which costs digits.
 #[test]
 fn torques_are_the_same_wherever_the_hand_stands() {
     let mut errors = Errors::new();
@@ -355,9 +356,9 @@ fn torques_are_the_same_wherever_the_hand_stands() {
 
 /// At the latch `u_st` and its potential are zero.
 ///
-/// Tolerances, in `K_st`: 1e-15 for the moments, because `R R^T` comes out symmetric, so that its deviation from one has no
-/// axial part; 1e-13 for the potential, because at the end of a chain of ten joints `R R^T` is one to about 1e-15 only, and
-/// fifteen diagonal entries are summed.
+/// Tolerances, in `K_st`: 1e-15 for the moments, because `R R^T` comes out symmetric, so that its deviation from one
+/// has no axial part; 1e-13 for the potential, because at the end of a chain of ten joints `R R^T` is one to about
+/// 1e-15 only, and fifteen diagonal entries are summed.
 #[test]
 fn nothing_pulls_at_the_attitudes_at_the_latch() {
     let (mut moments, mut potentials) = (Errors::new(), Errors::new());
@@ -376,7 +377,8 @@ fn nothing_pulls_at_the_attitudes_at_the_latch() {
     assert!(potentials.largest() < 1e-13);
 }
 
-/// Without `K_st` the law is `u_s` alone, to the last bit, whatever the latch; without a grip it only damps and carries.
+/// Without `K_st` the law is `u_s` alone, to the last bit, whatever the latch; without a grip it only damps and
+/// carries.
 #[test]
 fn normal_only_knows_no_latch() {
     for mut case in cases(8000, 100) {

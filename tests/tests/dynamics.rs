@@ -106,10 +106,10 @@ fn mass_matrix_is_the_hessian_of_kinetic_energy() {
 /// The velocity products of [`bias_torques`] are `C dq` with the `C` of Christoffel's symbols of `H`, for which
 /// `dH/dt - 2 C` is skew; so their power is half of `dq^T dH/dt dq`, with `dH/dt` along the motion itself.
 ///
-/// Tolerances, in units of `|H| s^2` with `s = sum|dq|`, the most that `C dq` can be: an entry of `H` is a polynomial of
-/// second degree in the sine and cosine of each angle, so that its fifth derivative along one joint is at most `2^5 |H|`
-/// and truncation `32 step^4 / 480` = 1e-12; rounding is 1e-12 too: 1e-11 for `C dq`. Along the motion all joints move at once;
-/// with `step * s` = 0.01 truncation is at most `32 * 0.01^4 / 480` = 7e-10: 1e-9 for `dH/dt`.
+/// Tolerances, in units of `|H| s^2` with `s = sum|dq|`, the most that `C dq` can be: an entry of `H` is a polynomial
+/// of second degree in the sine and cosine of each angle, so that its fifth derivative along one joint is at most
+/// `2^5 |H|` and truncation `32 step^4 / 480` = 1e-12; rounding is 1e-12 too: 1e-11 for `C dq`. Along the motion all
+/// joints move at once; with `step * s` = 0.01 truncation is at most `32 * 0.01^4 / 480` = 7e-10: 1e-9 for `dH/dt`.
 #[test]
 fn velocity_products_are_those_of_christoffel() {
     const STEP_RAD: f64 = 1.0 / 512.0;
@@ -193,8 +193,8 @@ fn brick() -> ObjectModel {
     ObjectModel { shape, mass_kg: 0.1, inertia_kg_m2 }
 }
 
-/// Advances a plant without torques and shows it solved at the beginning of each step but the first, where velocities are
-/// still those given.
+/// Advances a plant without torques and shows it solved at the beginning of each step but the first, where velocities
+/// are still those given.
 fn swing(plant: &mut Plant, steps: usize, mut each: impl FnMut(usize, &Plant)) {
     for step in 0..steps {
         plant.solve(&[0.0; MAX_JOINTS]).expect("nothing can be lost");
@@ -210,8 +210,9 @@ fn energy(description: &Description, plant: &Plant) -> f64 {
     plant.kinetic_energy_j() + description.weight_potential_j(&description.placed(angles), &GRAVITY_M_S2)
 }
 
-/// The hand of the paper swings from rest under its own weight, without damping: a chaotic motion of up to 40 rad/s, whose energy
-/// is constant. The integrator is of second order, so that the energy's error falls by four when the step is halved.
+/// The hand of the paper swings from rest under its own weight, without damping: a chaotic motion of up to 40 rad/s,
+/// whose energy is constant. The integrator is of second order, so that the energy's error falls by four when the
+/// step is halved.
 ///
 /// Tolerance: order at least 1.9 over a factor of four in the step.
 #[test]
@@ -248,9 +249,9 @@ fn a_swinging_hand_keeps_its_energy_to_second_order() {
 
 /// A free object falls on a parabola, which the leapfrog follows exactly.
 ///
-/// Tolerance: 3e-11 m/s and m over a second, 10,000 steps. Each adds the same number to velocities of up to 16 m/s, so that
-/// rounding, half a last place of 1.8e-15 m/s in the solution and twice that in its reflection, may go in one direction
-/// throughout: 10,000 * 1.5 * 1.8e-15 m/s = 2.7e-11 m/s, and half of that times a second.
+/// Tolerance: 3e-11 m/s and m over a second, 10,000 steps. Each adds the same number to velocities of up to 16 m/s,
+/// so that rounding, half a last place of 1.8e-15 m/s in the solution and twice that in its reflection, may go in one
+/// direction throughout: 10,000 * 1.5 * 1.8e-15 m/s = 2.7e-11 m/s, and half of that times a second.
 #[test]
 fn a_falling_object_matches_the_closed_form() {
     const STEP_S: f64 = 1e-4;
@@ -281,8 +282,9 @@ fn rotation(plant: &Plant) -> (Vector3<f64>, f64) {
 
 /// A free top that spins near its unstable axis tumbles, but keeps its angular momentum and its energy.
 ///
-/// Tolerances: the momentum to 1e-11 of itself: 20,000 steps at least, each of which rounds a few times by 1.1e-16 (`I I^-1 L`),
-/// random in sign or, at worst, 1e-15 a step in one direction. The energy to second order, at least 1.9.
+/// Tolerances: the momentum to 1e-11 of itself: 20,000 steps at least, each of which rounds a few times by 1.1e-16
+/// (`I I^-1 L`), random in sign or, at worst, 1e-15 a step in one direction. The energy to second order, at least
+/// 1.9.
 #[test]
 fn torque_free_rotation_keeps_momentum_and_energy() {
     let mut motion = Motion::at_rest(

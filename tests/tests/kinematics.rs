@@ -79,8 +79,8 @@ fn jacobians_are_the_derivatives_of_forward_kinematics() {
 
 /// The prepared frames differ from the description's, but what they place is the same.
 ///
-/// Tolerance: 2e-14 (m; unit-free for directions; relative for inertias): each of at most ten joints in a chain adds some ten
-/// roundings of 1.1e-16 in either computation, and they must add up, not multiply.
+/// Tolerance: 2e-14 (m; unit-free for directions; relative for inertias): each of at most ten joints in a chain adds
+/// some ten roundings of 1.1e-16 in either computation, and they must add up, not multiply.
 #[test]
 fn prepared_frames_place_what_the_description_says() {
     let mut errors = Errors::new();
@@ -110,8 +110,8 @@ fn prepared_frames_place_what_the_description_says() {
     assert!(errors.largest() < 2e-14);
 }
 
-/// `tau = g + sum(J_i^T F_i + J_Omega i^T M_i)`, with Jacobians from finite differences of the second forward kinematics
-/// and the weight of each link at its own mass centre.
+/// `tau = g + sum(J_i^T F_i + J_Omega i^T M_i)`, with Jacobians from finite differences of the second forward
+/// kinematics and the weight of each link at its own mass centre.
 ///
 /// Tolerance: 1e-10 of the largest torque that the loads could exert (`force * reach + moment`): the differences err by
 /// 1e-12, see above.
@@ -168,13 +168,13 @@ fn joint_torques_are_transposed_jacobians_times_wrenches() {
 /// The controller computes in `f32` what the tests above prove in `f64`.
 ///
 /// Bound, with `u` = 2^-24 (half the machine epsilon), `n` the length of the chain and `L` its reach:
-/// - Each joint adds an error to the attitude (Frobenius norm) of at most `sqrt(3) u` for the rounded constants, `9 u` for
-///   the product of two rotations, `2 * 3.4 u` for sine and cosine (their stated 2e-7 is 3.4 `u`) and `4 u` for turning
-///   the axes: `22 u` in all, `22 n u` along the chain.
+/// - Each joint adds an error to the attitude (Frobenius norm) of at most `sqrt(3) u` for the rounded constants,
+///   `9 u` for the product of two rotations, `2 * 3.4 u` for sine and cosine (their stated 2e-7 is 3.4 `u`) and
+///   `4 u` for turning the axes: `22 u` in all, `22 n u` along the chain.
 /// - An origin inherits `22 k u` of each bone before it and adds `7 u` of the bone for rounding and `u L` for the sum:
 ///   `(23 n + 7) u L` for a fingertip's centre.
-/// - A column of `J` is an axis (error `22 n u`) times a lever (length up to `2 L`, an error of two positions): with the
-///   rounding of the product `(44 n + 2 (23 n + 7) + 7) u L = (90 n + 21) u L`.
+/// - A column of `J` is an axis (error `22 n u`) times a lever (length up to `2 L`, an error of two positions): with
+///   the rounding of the product `(44 n + 2 (23 n + 7) + 7) u L = (90 n + 21) u L`.
 #[test]
 fn single_precision_stays_within_its_bound() {
     let u = f64::from(f32::EPSILON) / 2.0;
@@ -212,7 +212,8 @@ fn single_precision_stays_within_its_bound() {
 
 /// A joint whose axis is exactly, nearly or almost not its parent's: the special case of the preparation has no edge.
 ///
-/// Tolerance: 1e-13 m: an axis that is its parent's to 1e-14 is taken as parallel, in up to ten joints, of a reach below 1 m.
+/// Tolerance: 1e-13 m: an axis that is its parent's to 1e-14 is taken as parallel, in up to ten joints, of a reach
+/// below 1 m.
 #[test]
 fn axes_near_the_parents_are_no_special_case() {
     let mut draw = Draw::new(5);

@@ -1,8 +1,8 @@
 //! The run as a short GIF that plays in a loop.
 
-use super::Report;
 use super::camera::Camera;
 use super::canvas::Canvas;
+use super::input::Report;
 use super::palette::{FAINT_INK, INK};
 use super::picture::words;
 use super::quantise::{Quantiser, UNCHANGED};
@@ -143,7 +143,7 @@ mod tests {
         }
         assert_eq!(Schedule::new(&[]).times, [0.0]);
         let short = Schedule::new(&fixture::samples(50));
-        assert_eq!((short.speed, short.times.len()), (0.1, 7), "no slower than a tenth");
+        assert_eq!((short.speed, short.times.len()), (0.1, 8), "no slower than a tenth");
         assert!(Schedule::new(&fixture::samples(1)).times.len() == 1);
     }
 

@@ -3,8 +3,9 @@
 use blindgrasp_shared::math::Real;
 use nalgebra::Vector3;
 
-/// How steeply the camera looks down, degrees.
+/// How steeply the camera looks down, degrees: usually, and where things happen on both sides of the palm.
 const ELEVATION_DEG: f64 = 30.0;
+const LOW_ELEVATION_DEG: f64 = 12.0;
 
 /// A direction of view: unit vectors of the picture in the base frame of the hand.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -16,10 +17,10 @@ pub(super) struct View {
 }
 
 impl View {
-    /// Looks from `azimuth` (degrees about z, from x) and from above.
-    fn from_azimuth(azimuth_deg: f64) -> Self {
+    /// Looks from `azimuth` (about z, from x) and from `elevation` above.
+    fn towards(azimuth_deg: f64, elevation_deg: f64) -> Self {
         let (sine, cosine) = azimuth_deg.to_radians().sine_cosine();
-        let (rise, level) = ELEVATION_DEG.to_radians().sine_cosine();
+        let (rise, level) = elevation_deg.to_radians().sine_cosine();
         let back = Vector3::new(cosine * level, sine * level, rise);
         let right = Vector3::new(-sine, cosine, 0.0);
         Self { right, up: back.cross(&right), back }
@@ -28,8 +29,10 @@ impl View {
     /// The view in which the object hides the fingers least, and the fingers the object: no finger comes towards the
     /// viewer or goes straight away, and one looks at the palm's face rather than at its back.
     ///
-    /// `fingers` lead from the object to the fingertips, `palm` from the palm to the object.
-    pub(super) fn on_grasp(fingers: &[Vector3<f64>], palm: &Vector3<f64>) -> Self {
+    /// `fingers` lead from the object to the fingertips, `palm` from the palm to the object. Looks from lower down where
+    /// the run `passes_palm`, which would hide it.
+    pub(super) fn on_grasp(fingers: &[Vector3<f64>], palm: &Vector3<f64>, passes_palm: bool) -> Self {
+        let elevation_deg = if passes_palm { LOW_ELEVATION_DEG } else { ELEVATION_DEG };
         let level = |v: &Vector3<f64>| {
             let flat = Vector3::new(v.x, v.y, 0.0);
             let length = v.norm();
@@ -45,13 +48,13 @@ impl View {
         };
         let best = (0..72)
             .map(|k| 5.0 * f64::from(k))
-            .map(|azimuth| (azimuth, cost(&Self::from_azimuth(azimuth))))
+            .map(|azimuth| (azimuth, cost(&Self::towards(azimuth, elevation_deg))))
             .fold((0.0, f64::INFINITY), |best, candidate| {
                 // Rounding must not choose between two views that are equally good.
                 if candidate.1 < best.1 - 1e-6 { candidate } else { best }
             });
         // A little to the side, so that no face is seen square on.
-        Self::from_azimuth(best.0 + 12.0)
+        Self::towards(best.0 + 12.0, elevation_deg)
     }
 
     /// Where a point is in the picture plane, to the right and up, m.
@@ -131,7 +134,7 @@ mod tests {
     #[test]
     fn views_are_right_handed_and_prefer_an_open_side() {
         let fingers = [Vector3::x(), -Vector3::x(), Vector3::y()];
-        let view = View::on_grasp(&fingers, &Vector3::z());
+        let view = View::on_grasp(&fingers, &Vector3::z(), false);
         assert!((view.right.cross(&view.up) - view.back).norm() < 1e-12);
         assert!(view.back.y < -0.5, "from the side on which there is no finger: {view:?}");
         assert!(view.up.z > 0.5);
@@ -139,7 +142,7 @@ mod tests {
 
     #[test]
     fn the_extent_fills_the_frame() {
-        let view = View::from_azimuth(30.0);
+        let view = View::towards(30.0, 30.0);
         let extent = Extent::around([[-0.1, -0.2], [0.3, 0.1], [f64::NAN, 9.0]].into_iter());
         let camera = Camera::fitted(view, &extent, [0.0, 10.0], [400.0, 310.0]);
         assert!((camera.pixels_per_m - 1000.0).abs() < 1e-9);

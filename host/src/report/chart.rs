@@ -1,21 +1,19 @@
-//! A figure: panels above one another over one time axis, each with its legend at its side. Drawn by Plotters, once as
-//! a bitmap and once as SVG.
+//! Draws a figure with Plotters, once as a bitmap and once as SVG.
 
 use super::backend::Pen;
 use super::canvas::Canvas;
-use super::palette::{FAINT_INK, GRID, INK, Rgb};
-use super::{series, text};
+use super::figure::{Axis, Figure, Line, Panel};
+use super::palette::{FAINT_INK, GRID, INK};
+use super::pens::{LABEL_SIZE, ink, letters, pen, reason};
+use super::{legend, series, text};
 use plotters::coord::Shift;
 use plotters::coord::cartesian::Cartesian2d;
 use plotters::coord::ranged1d::{DefaultFormatting, KeyPointHint, Ranged};
 use plotters::prelude::{
-    ChartBuilder, ChartContext, Circle, DrawingArea, DrawingBackend, FontDesc, FontFamily, FontStyle,
-    IntoDrawingArea, LabelAreaPosition, LineSeries, PathElement, RGBColor, SVGBackend, ShapeStyle, Text,
-    TextStyle, WHITE,
+    ChartBuilder, ChartContext, Circle, DrawingArea, DrawingBackend, IntoDrawingArea, LabelAreaPosition,
+    LineSeries, PathElement, SVGBackend, Text, WHITE,
 };
 use plotters::style::text_anchor::{HPos, Pos, VPos};
-use plotters_backend::BackendColor;
-use std::fmt::Display;
 use std::ops::Range;
 
 /// Sizes below are in pixels of the finished picture. Bitmaps are drawn this much larger and averaged down; SVG files,
@@ -29,70 +27,7 @@ const TIME_LABELS_HEIGHT: i32 = 42;
 const VALUE_LABELS_WIDTH: i32 = 74;
 /// Left of the rotated label, which Plotters sets flush.
 const VALUE_MARGIN: i32 = 8;
-const LEGEND_WIDTH: i32 = 172;
-const LEGEND_PITCH: i32 = 19;
-const LABEL_SIZE: i32 = 15;
 const TITLE_SIZE: i32 = 21;
-const LINE_WIDTH: f64 = 1.6;
-
-/// How a line is broken: pixels drawn and pixels left out.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum Dash {
-    Solid,
-    Broken(f64, f64),
-}
-
-impl Dash {
-    /// The dashes of the `k`-th of several lines, so that lines that coincide still show.
-    pub(super) fn of(k: usize) -> Self {
-        let broken = [(9.0, 4.0), (3.0, 3.0), (16.0, 5.0), (11.0, 11.0), (2.0, 7.0)];
-        match k.checked_sub(1).and_then(|k| broken.get(k % broken.len())) {
-            Some((on, off)) => Self::Broken(*on, *off),
-            None => Self::Solid,
-        }
-    }
-}
-
-/// One signal.
-#[derive(Clone, Debug)]
-pub(super) struct Line {
-    pub(super) name: String,
-    pub(super) colour: Rgb,
-    pub(super) dash: Dash,
-    /// One value for each time of the figure, in the panel's unit; what is not finite is left out.
-    pub(super) values: Vec<f64>,
-}
-
-/// How values are laid out along the vertical axis.
-#[derive(Clone, Debug, PartialEq)]
-pub(super) enum Axis {
-    /// Over this range, in the panel's unit.
-    Linear(Range<f64>),
-    /// Over these powers of ten; smaller values sit on the lower edge. `None` where no value is above zero.
-    Decades(Option<Range<f64>>),
-}
-
-/// One coordinate system.
-#[derive(Clone, Debug)]
-pub(super) struct Panel {
-    /// Over the legend.
-    pub(super) heading: String,
-    /// What is drawn: the axis label without the unit.
-    pub(super) quantity: &'static str,
-    /// SI unit without prefix.
-    pub(super) unit: &'static str,
-    pub(super) axis: Axis,
-    pub(super) lines: Vec<Line>,
-}
-
-/// A whole figure.
-#[derive(Clone, Debug)]
-pub(super) struct Figure {
-    pub(super) title: String,
-    /// s
-    pub(super) times: Vec<f64>,
-    pub(super) panels: Vec<Panel>,
-}
 
 impl Figure {
     /// The figure as a PNG file.
@@ -133,7 +68,7 @@ impl Figure {
             _ => 175,
         };
         let lines = self.panels.get(k).map_or(0, |panel| panel.lines.len() as i32);
-        usual.max((lines + 2) * LEGEND_PITCH)
+        usual.max((lines + 2) * legend::PITCH)
     }
 
     fn draw<B: DrawingBackend>(&self, root: &DrawingArea<B, Shift>, scale: i32) -> Result<(), String> {
@@ -148,9 +83,9 @@ impl Figure {
             let height = self.panel_height(k) + if last { TIME_LABELS_HEIGHT } else { 0 };
             let (_, below) = root.split_vertically(top * scale);
             let (area, _) = below.split_vertically(height * scale);
-            let (chart, legend) = area.split_horizontally((WIDTH - LEGEND_WIDTH) * scale);
+            let (chart, legend) = area.split_horizontally((WIDTH - legend::WIDTH) * scale);
             self.draw_panel(panel, &chart, last, scale)?;
-            draw_legend(panel, &legend, scale)?;
+            legend::draw(panel, &legend, scale)?;
             top += height;
         }
         root.present().map_err(reason)
@@ -223,7 +158,7 @@ impl Figure {
             return area.draw(&Text::new("no values above zero", at, style)).map_err(reason);
         }
         // Columns of the bitmap as it is shown: finer ones can't be told apart.
-        let columns = (WIDTH - LEGEND_WIDTH - VALUE_LABELS_WIDTH) as usize;
+        let columns = (WIDTH - legend::WIDTH - VALUE_LABELS_WIDTH) as usize;
         for line in &panel.lines {
             let values: Vec<f64> = match decades {
                 // Zero has no logarithm; it sits on the lower edge with all that is too small.
@@ -276,68 +211,12 @@ fn draw_line<B: DrawingBackend>(
             .map(|_| ())
             .map_err(reason);
     }
-    let parts = match line.dash {
-        Dash::Solid => vec![points],
-        Dash::Broken(on, off) => {
-            let (width, height) = chart.plotting_area().dim_in_pixel();
-            let (times, values) = (chart.x_range(), chart.y_range());
-            let shown = |pixels: u32| f64::from(pixels) / f64::from(scale);
-            let pixels =
-                (shown(width) / (times.end - times.start), shown(height) / (values.end - values.start));
-            series::dashes(&points, pixels, (on, off))
-        }
-    };
-    parts
+    let (width, height) = chart.plotting_area().dim_in_pixel();
+    let (times, values) = (chart.x_range(), chart.y_range());
+    let shown = |pixels: u32| f64::from(pixels) / f64::from(scale);
+    let pixels = (shown(width) / (times.end - times.start), shown(height) / (values.end - values.start));
+    line.dash
+        .cut(points, pixels)
         .into_iter()
         .try_for_each(|part| chart.draw_series(LineSeries::new(part, style)).map(|_| ()).map_err(reason))
-}
-
-fn draw_legend<B: DrawingBackend>(
-    panel: &Panel,
-    area: &DrawingArea<B, Shift>,
-    scale: i32,
-) -> Result<(), String> {
-    let words = |colour| letters(LABEL_SIZE, scale, colour).pos(Pos::new(HPos::Left, VPos::Center));
-    let mut y = 15;
-    if !panel.heading.is_empty() {
-        let at = (4 * scale, y * scale);
-        area.draw(&Text::new(text::shortened(&panel.heading, 22), at, words(INK))).map_err(reason)?;
-        y += LEGEND_PITCH;
-    }
-    for line in &panel.lines {
-        let sample = [(4.0, f64::from(y)), (36.0, f64::from(y))];
-        let parts = match line.dash {
-            Dash::Solid => vec![sample.to_vec()],
-            Dash::Broken(on, off) => series::dashes(&sample, (1.0, 1.0), (on, off)),
-        };
-        for part in parts {
-            let fine = |v: f64| (v * f64::from(scale)).round() as i32;
-            let part: Vec<(i32, i32)> = part.into_iter().map(|(x, y)| (fine(x), fine(y))).collect();
-            area.draw(&PathElement::new(part, pen(line.colour, scale))).map_err(reason)?;
-        }
-        let at = (43 * scale, y * scale);
-        area.draw(&Text::new(text::shortened(&line.name, 17), at, words(INK))).map_err(reason)?;
-        y += LEGEND_PITCH;
-    }
-    Ok(())
-}
-
-fn reason(error: impl Display) -> String {
-    error.to_string()
-}
-
-fn ink(colour: Rgb, width: u32) -> ShapeStyle {
-    ShapeStyle { color: RGBColor(colour[0], colour[1], colour[2]).into(), filled: false, stroke_width: width }
-}
-
-fn pen(colour: Rgb, scale: i32) -> ShapeStyle {
-    ink(colour, (LINE_WIDTH * f64::from(scale)).round() as u32)
-}
-
-fn letters(size: i32, scale: i32, colour: Rgb) -> TextStyle<'static> {
-    TextStyle {
-        font: FontDesc::new(FontFamily::SansSerif, f64::from(size * scale), FontStyle::Normal),
-        color: BackendColor { alpha: 1.0, rgb: (colour[0], colour[1], colour[2]) },
-        pos: Pos::default(),
-    }
 }

@@ -1,6 +1,6 @@
 //! Figures of a run: plots, pictures of the grasp, and a short animation.
 //!
-//! [`write`] leaves these files in a directory; the same run gives the same bytes.
+//! [`write()`] leaves these files in a directory; the same run gives the same bytes.
 //!
 //! | file | shows |
 //! |---|---|
@@ -11,19 +11,24 @@
 //! | `grasp-start.png`, `grasp-end.png` | hand, object and contact forces in three dimensions (bitmaps only) |
 //! | `grasp.gif` | the run, in about six seconds |
 //!
-//! [`plots`] says what the plots show, [`chart`] draws them with Plotters; [`scene3d`] turns hand and object into
-//! triangles, [`camera`] chooses where to look from, [`raster`] draws them, [`picture`] and [`animation`] add the words.
-//! [`canvas`] and [`text`] are the bitmap under all of it.
+//! `plots` says what the plots show, `chart` draws them with Plotters; `scene3d` turns hand and object into triangles,
+//! `camera` chooses where to look from, `raster` draws them, `picture` and `animation` add the words. `canvas` and
+//! `text` are the bitmap under all of it.
 
 mod animation;
 mod backend;
 mod camera;
 mod canvas;
 mod chart;
+mod figure;
 #[cfg(test)]
 mod fixture;
+mod input;
+mod legend;
 mod mesh;
 mod palette;
+mod palm;
+mod pens;
 mod picture;
 mod plots;
 mod quantise;
@@ -35,45 +40,29 @@ mod skeleton;
 mod tests;
 mod text;
 
-use crate::Hand;
-use crate::plant::polyhedron::Polyhedron;
-use crate::record::sample::Sample;
+pub use input::Report;
+
 use std::path::{Path, PathBuf};
 use std::{fs, io};
 
-/// What a report is made from.
-#[derive(Clone, Copy, Debug)]
-pub struct Report<'a> {
-    /// Over every figure: the scene's name.
-    pub title: &'a str,
-    /// The hand.
-    pub hand: &'a Hand,
-    /// Names of its joints, in their order.
-    pub joint_names: &'a [String],
-    /// The object.
-    pub object: &'a Polyhedron,
-    /// The run, in the order of time.
-    pub samples: &'a [Sample],
-}
-
-/// Why a report could not be written.
+/// Why a report could not be written. The message has the cause in it, so that it reads whole on its own.
 #[derive(Debug, thiserror::Error)]
 pub enum ReportError {
     /// The directory is missing and can't be made.
-    #[error("cannot create the directory {}: {source}", path.display())]
+    #[error("cannot create the directory {}: {cause}", path.display())]
     Directory {
         /// The directory.
         path: PathBuf,
         /// What the system said.
-        source: io::Error,
+        cause: io::Error,
     },
     /// A file can't be written.
-    #[error("cannot write {}: {source}", path.display())]
+    #[error("cannot write {}: {cause}", path.display())]
     Write {
         /// The file.
         path: PathBuf,
         /// What the system said.
-        source: io::Error,
+        cause: io::Error,
     },
     /// A figure can't be drawn.
     #[error("cannot draw {}: {reason}", path.display())]
@@ -93,11 +82,11 @@ pub enum ReportError {
 /// # Errors
 /// The first file that could not be drawn or written; those before it are there.
 pub fn write(dir: &Path, report: &Report<'_>) -> Result<(), ReportError> {
-    fs::create_dir_all(dir).map_err(|source| ReportError::Directory { path: dir.to_owned(), source })?;
+    fs::create_dir_all(dir).map_err(|cause| ReportError::Directory { path: dir.to_owned(), cause })?;
     let save = |name: String, drawn: Result<Vec<u8>, String>| {
         let path = dir.join(name);
         match drawn {
-            Ok(bytes) => fs::write(&path, bytes).map_err(|source| ReportError::Write { path, source }),
+            Ok(bytes) => fs::write(&path, bytes).map_err(|cause| ReportError::Write { path, cause }),
             Err(reason) => Err(ReportError::Draw { path, reason }),
         }
     };

@@ -1,8 +1,8 @@
 //! Pictures of the grasp: the rendered scene with title, time, finger forces and scale bars.
 
-use super::Report;
 use super::camera::Camera;
 use super::canvas::Canvas;
+use super::input::Report;
 use super::palette::{self, FAINT_INK, INK, Rgb};
 use super::scene3d::{FORCE, Stage};
 use super::text::{self, Anchor, Turn};

@@ -1,7 +1,8 @@
 //! What the figures show: joint velocities, object velocities, contact forces, residuals.
 
-use super::chart::{Axis, Dash, Figure, Line, Panel};
+use super::figure::{Axis, Figure, Line, Panel};
 use super::palette::{self, BLACK, BLUE, VERMILLION};
+use super::pens::Dash;
 use super::series;
 use crate::Hand;
 use crate::record::sample::{ContactSample, Sample};

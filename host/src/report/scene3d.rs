@@ -1,12 +1,14 @@
 //! One moment of a run as triangles: hand, object, contact forces; and the stage that all moments of a run share.
 
-use super::Report;
 use super::camera::{Extent, View};
+use super::input::Report;
 use super::mesh::{Mesh, ROUND, THIN};
 use super::palette::Rgb;
+use super::palm::{self, Palm};
 use super::skeleton::{self, Sizes};
 use crate::plant::polyhedron::Polyhedron;
 use crate::record::sample::{ContactSample, Sample};
+use crate::{Hand, MAX_JOINTS, Posture};
 use nalgebra::Vector3;
 use std::collections::BTreeSet;
 
@@ -16,9 +18,10 @@ pub(super) const FORCE: Rgb = [250, 226, 60];
 const EDGE: Rgb = [52, 66, 84];
 
 /// What is the same for all moments of a run: sizes, the scale of the forces, and where to look from.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub(super) struct Stage {
     sizes: Sizes,
+    palms: Vec<Palm>,
     /// Length of the arrow of 1 N, m.
     pub(super) m_per_n: f64,
     /// Mean distance of the object's corners from its centre of mass, m.
@@ -39,18 +42,21 @@ impl Stage {
             radius if radius > 0.0 && radius.is_finite() => radius,
             _ => 0.05,
         };
+        let probes: Vec<Option<&Sample>> = match report.samples.len() {
+            0 => vec![None],
+            count => (0..PROBES).map(|k| report.samples.get(k * (count - 1) / (PROBES - 1))).collect(),
+        };
+        let postures: Vec<Posture> = probes.iter().map(|sample| posture(report.hand, *sample)).collect();
         let sizes = Sizes::of(report.hand);
+        let palms = Palm::all(report.hand, &postures[0]);
         let mut stage = Self {
             sizes,
             m_per_n: reach(report.samples).unwrap_or(0.6 * object_radius_m) / usual_force(report.samples),
             object_radius_m,
-            view: view(report),
+            view: view(report, &palms, &postures),
+            palms,
             extent: Extent::around(std::iter::empty()),
             outline_m: 0.8 * sizes.link_radius_m,
-        };
-        let probes: Vec<Option<&Sample>> = match report.samples.len() {
-            0 => vec![None],
-            count => (0..PROBES).map(|k| report.samples.get(k * (count - 1) / (PROBES - 1))).collect(),
         };
         let meshes: Vec<Mesh> = probes.into_iter().map(|sample| stage.mesh(report, sample)).collect();
         // An object that was lost flies away; the picture stays with the hand.
@@ -68,8 +74,8 @@ impl Stage {
     /// Hand, object and forces at one sample; the hand alone, its joints at zero, without one.
     pub(super) fn mesh(&self, report: &Report<'_>, sample: Option<&Sample>) -> Mesh {
         let mut mesh = Mesh::default();
-        let angles = sample.map_or(&[][..], |sample| &sample.angles_rad);
-        skeleton::add(&mut mesh, report.hand, &skeleton::posture(report.hand, angles), &self.sizes);
+        let posture = posture(report.hand, sample);
+        skeleton::add(&mut mesh, report.hand, &posture, &self.sizes, &self.palms);
         if let Some(sample) = sample {
             self.add_object(&mut mesh, report.object, sample);
             for contact in &sample.contacts {
@@ -143,13 +149,31 @@ fn reach(samples: &[Sample]) -> Option<f64> {
     Some(reach / sample.contacts.len() as f64).filter(|reach| *reach > 0.0 && reach.is_finite())
 }
 
-fn view(report: &Report<'_>) -> View {
-    let angles = report.samples.first().map_or(&[][..], |sample| &sample.angles_rad);
-    let posture = skeleton::posture(report.hand, angles);
-    let tips = &posture.centres_m[..report.hand.fingertip_count()];
-    let object = report.samples.first().map_or_else(|| skeleton::middle(tips), |sample| sample.position_m);
-    let fingers: Vec<Vector3<f64>> = tips.iter().map(|tip| tip - object).collect();
-    View::on_grasp(&fingers, &(object - skeleton::palm_centre(report.hand, &posture)))
+/// The hand at one sample; with all joints at zero without one.
+fn posture(hand: &Hand, sample: Option<&Sample>) -> Posture {
+    let mut angles = [0.0; MAX_JOINTS];
+    for (slot, angle) in angles.iter_mut().zip(sample.into_iter().flat_map(|sample| &sample.angles_rad)) {
+        *slot = *angle;
+    }
+    let mut posture = Posture::at_base();
+    hand.forward_kinematics(&angles, &mut posture);
+    posture
+}
+
+/// Chooses the view for a run from its start, and from whether the fingers stay in front of the palm.
+fn view(report: &Report<'_>, palms: &[Palm], postures: &[Posture]) -> View {
+    let tips = |posture: &Posture| posture.centres_m[..report.hand.fingertip_count()].to_vec();
+    let start = tips(&postures[0]);
+    let object = report.samples.first().map_or_else(|| palm::middle(&start), |sample| sample.position_m);
+    let fingers: Vec<Vector3<f64>> = start.iter().map(|tip| tip - object).collect();
+    let centre = palms.first().map_or(Vector3::zeros(), |palm| palm.placed(&postures[0]).0);
+    let passes_palm = postures.iter().any(|posture| {
+        palms.iter().any(|palm| {
+            let (centre, normal) = palm.placed(posture);
+            tips(posture).iter().any(|tip| (tip - centre).dot(&normal) < 0.0)
+        })
+    });
+    View::on_grasp(&fingers, &(object - centre), passes_palm)
 }
 
 /// Where the points of a mesh are, roughly.
@@ -162,12 +186,12 @@ impl Cloud {
     fn around(mesh: &Mesh) -> Self {
         let finite = |point: &&Vector3<f64>| point.iter().all(|v| v.is_finite());
         let points: Vec<Vector3<f64>> = mesh.points().filter(finite).copied().collect();
-        let centre = skeleton::middle(&points);
+        let centre = palm::middle(&points);
         let radius = points.iter().map(|point| (point - centre).norm()).fold(0.0, f64::max);
         Self { centre, radius }
     }
 
     fn is_near(&self, point: &Vector3<f64>) -> bool {
-        (point - self.centre).norm() <= 1.5 * self.radius
+        (point - self.centre).norm() <= 2.5 * self.radius
     }
 }

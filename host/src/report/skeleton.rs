@@ -2,7 +2,8 @@
 
 use super::mesh::{Mesh, ROUND, WIDE};
 use super::palette::{self, Rgb};
-use crate::{Hand, MAX_JOINTS, Posture};
+use super::palm::Palm;
+use crate::{Hand, Posture};
 use nalgebra::Vector3;
 
 const LINK: Rgb = [208, 212, 218];
@@ -34,41 +35,27 @@ impl Sizes {
     }
 }
 
-/// Places the hand for these joint angles; joints that are not given stand at zero.
-pub(super) fn posture(hand: &Hand, angles_rad: &[f64]) -> Posture {
-    let mut all = [0.0; MAX_JOINTS];
-    for (slot, angle) in all.iter_mut().zip(angles_rad) {
-        *slot = *angle;
-    }
-    let mut posture = Posture::at_base();
-    hand.forward_kinematics(&all, &mut posture);
-    posture
-}
-
 /// Adds the hand to a mesh.
-pub(super) fn add(mesh: &mut Mesh, hand: &Hand, posture: &Posture, sizes: &Sizes) {
+pub(super) fn add(mesh: &mut Mesh, hand: &Hand, posture: &Posture, sizes: &Sizes, palms: &[Palm]) {
     let origin = |k: usize| posture.links[k].origin_m;
-    let parents: Vec<Option<usize>> =
-        std::iter::once(None).chain((0..hand.joint_count()).map(Some)).collect();
-    for parent in parents {
-        let children: Vec<usize> = (0..hand.joint_count()).filter(|&k| hand.parent(k) == parent).collect();
+    for joint in 0..hand.joint_count() {
+        let parent = hand.parent(joint);
+        // Links that start from a plate lie in it.
+        if palms.iter().any(|palm| palm.link == parent) {
+            continue;
+        }
         let foot = parent.map_or(Vector3::zeros(), origin);
-        match children.as_slice() {
-            [] => {}
-            [only] => {
-                if parent.is_none() {
-                    pedestal(mesh, origin(*only), sizes);
-                }
-                link(mesh, hand, *only, [foot, origin(*only)], sizes);
-            }
-            several => {
-                let bases: Vec<Vector3<f64>> = several.iter().map(|&k| origin(k)).collect();
-                let palm = Palm::new(&bases, &middle(&posture.centres_m[..hand.fingertip_count()]));
-                palm.add(mesh, sizes);
-                if parent.is_some() {
-                    mesh.cone([foot, palm.centre_m], [sizes.trunk_radius_m; 2], ROUND, LINK);
-                }
-            }
+        if parent.is_none() {
+            pedestal(mesh, origin(joint), sizes);
+        }
+        link(mesh, hand, joint, [foot, origin(joint)], sizes);
+    }
+    for palm in palms {
+        let (centre, normal) = palm.placed(posture);
+        plate(mesh, centre, normal, palm.radius_m, sizes);
+        if let Some(link) = palm.link {
+            let inside = centre - normal * sizes.link_radius_m;
+            mesh.cone([origin(link), inside], [sizes.trunk_radius_m; 2], ROUND, LINK);
         }
     }
     for joint in 0..hand.joint_count() {
@@ -106,73 +93,13 @@ fn pedestal(mesh: &mut Mesh, top: Vector3<f64>, sizes: &Sizes) {
     mesh.cone([top - Vector3::z() * 0.4 * radius, top], [radius, 0.8 * radius], WIDE, PALM);
 }
 
-/// Mean of some points; the origin if there is none.
-pub(super) fn middle(points: &[Vector3<f64>]) -> Vector3<f64> {
-    points.iter().sum::<Vector3<f64>>() / points.len().max(1) as f64
-}
-
-/// The plate that fingers start from.
-pub(super) struct Palm {
-    pub(super) centre_m: Vector3<f64>,
-    radius_m: f64,
-    /// Unit vector out of its face, towards the fingertips.
-    normal: Vector3<f64>,
-}
-
-impl Palm {
-    fn new(bases: &[Vector3<f64>], towards: &Vector3<f64>) -> Self {
-        let centre_m = middle(bases);
-        let spokes: Vec<Vector3<f64>> = bases.iter().map(|base| base - centre_m).collect();
-        let longest = |best: Vector3<f64>, v: Vector3<f64>| if v.norm() > best.norm() { v } else { best };
-        let widest = spokes.iter().copied().fold(Vector3::zeros(), longest);
-        let out = towards - centre_m;
-        // Two fingers span no plane: then the plate faces the fingertips as well as it can.
-        let plane = spokes.iter().map(|spoke| widest.cross(spoke)).fold(Vector3::zeros(), longest);
-        let radius_m = widest.norm();
-        let normal = if plane.norm() > 1e-3 * radius_m * radius_m && radius_m > 0.0 {
-            plane * plane.dot(&out).signum()
-        } else if radius_m > 0.0 {
-            out - widest * (out.dot(&widest) / (radius_m * radius_m))
-        } else {
-            out
-        };
-        let normal = normal.try_normalize(0.0).unwrap_or(Vector3::z());
-        Self { centre_m, radius_m, normal }
-    }
-
-    fn add(&self, mesh: &mut Mesh, sizes: &Sizes) {
-        let radius = self.radius_m + 2.2 * sizes.link_radius_m;
-        let face = self.centre_m - self.normal * 0.3 * sizes.link_radius_m;
-        let rim = 0.12 * sizes.link_radius_m.max(radius * 0.3);
-        let thickness = 0.14 * radius + sizes.link_radius_m;
-        // A chamfer catches the light.
-        mesh.cone([face - self.normal * rim, face], [radius, radius - rim], WIDE, PALM);
-        mesh.cone([face - self.normal * thickness, face - self.normal * rim], [radius; 2], WIDE, PALM);
-    }
-}
-
-/// The plate that carries most fingers: where the grasp is seen from. The origin if no plate does.
-pub(super) fn palm_centre(hand: &Hand, posture: &Posture) -> Vector3<f64> {
-    let joints = |parent| (0..hand.joint_count()).filter(move |&k| hand.parent(k) == parent);
-    std::iter::once(None)
-        .chain((0..hand.joint_count()).map(Some))
-        .map(|parent| joints(parent).map(|k| posture.links[k].origin_m).collect::<Vec<_>>())
-        .filter(|bases| bases.len() > 1)
-        .max_by_key(Vec::len)
-        .map_or(Vector3::zeros(), |bases| middle(&bases))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_palm_faces_the_fingertips() {
-        let bases = [Vector3::x(), -Vector3::x(), Vector3::y()];
-        let palm = Palm::new(&bases, &Vector3::new(0.2, 0.1, -3.0));
-        assert!((palm.normal + Vector3::z()).norm() < 1e-12);
-        let pair = Palm::new(&bases[..2], &Vector3::new(0.5, 0.0, 2.0));
-        assert!((pair.normal - Vector3::z()).norm() < 1e-12, "square to the line between two fingers");
-        assert_eq!(Palm::new(&[Vector3::zeros(); 3], &Vector3::zeros()).normal, Vector3::z());
-    }
+/// A disc that fingers start from; `normal` points out of its face.
+fn plate(mesh: &mut Mesh, centre: Vector3<f64>, normal: Vector3<f64>, spokes_m: f64, sizes: &Sizes) {
+    let radius = spokes_m + 2.2 * sizes.link_radius_m;
+    let face = centre - normal * 0.3 * sizes.link_radius_m;
+    let rim = 0.12 * sizes.link_radius_m.max(radius * 0.3);
+    let thickness = 0.14 * radius + sizes.link_radius_m;
+    // A chamfer catches the light.
+    mesh.cone([face - normal * rim, face], [radius, radius - rim], WIDE, PALM);
+    mesh.cone([face - normal * thickness, face - normal * rim], [radius; 2], WIDE, PALM);
 }

@@ -183,3 +183,14 @@ fn what_cannot_be_written_is_named() {
     let error = report_of(&[], &scratch.0).unwrap_err();
     assert!(matches!(&error, ReportError::Write { path, .. } if *path == blocked), "{error}");
 }
+
+#[cfg(target_os = "linux")]
+#[test]
+fn a_full_disk_is_an_error() {
+    let scratch = Scratch::new("full");
+    fs::create_dir_all(&scratch.0).unwrap();
+    std::os::unix::fs::symlink("/dev/full", scratch.0.join("residuals.svg")).unwrap();
+    let error = report_of(&[], &scratch.0).unwrap_err();
+    let ReportError::Write { path, cause } = &error else { panic!("{error}") };
+    assert!(path.ends_with("residuals.svg") && cause.kind() == std::io::ErrorKind::StorageFull, "{error}");
+}

@@ -96,7 +96,7 @@ impl Simulation {
     pub fn run(mut self, mut progress: impl FnMut(f64)) -> Run {
         let begun = Instant::now();
         let mut samples = Vec::with_capacity(self.ticks as usize + 1);
-        let mut applied = self.controller.torques_nm();
+        let mut applied = None;
         let mut lost = None;
         for tick in 0..=self.ticks {
             let t_s = tick as f64 * self.period_s;
@@ -115,11 +115,12 @@ impl Simulation {
         Run { samples, summary }
     }
 
-    /// One control period that begins at `t_s`. `applied` are the torques on the joints, before and after.
+    /// One control period that begins at `t_s`. `applied` are the torques on the joints, before (if there was a before) and
+    /// after.
     fn period(
         &mut self,
         t_s: f64,
-        applied: &mut JointVector,
+        applied: &mut Option<JointVector>,
         samples: &mut Vec<Sample>,
     ) -> Result<(), (f64, Lost)> {
         // 1, 2: sense and control.
@@ -128,20 +129,19 @@ impl Simulation {
         self.controller.tick(&motion.angles_rad, &motion.speeds_rad_s);
         // 3: actuate.
         let wanted = if self.delayed { computed_before } else { self.controller.torques_nm() };
-        let before = *applied;
-        for ((applied, wanted), limit) in applied.iter_mut().zip(wanted).zip(&self.torque_limits_nm) {
-            *applied = wanted.clamp(-limit, *limit);
-        }
+        let now: JointVector =
+            std::array::from_fn(|k| wanted[k].clamp(-self.torque_limits_nm[k], self.torque_limits_nm[k]));
+        let before = applied.replace(now).unwrap_or(now);
         // 4: plant. The torques change at the very instant of the first sub-step, whose kick covers half a sub-step on
         // either side: it gets their mean, which keeps the integrator's second order.
-        let mut torques: JointVector = std::array::from_fn(|k| 0.5 * (before[k] + applied[k]));
+        let mut torques: JointVector = std::array::from_fn(|k| 0.5 * (before[k] + now[k]));
         for substep in 0..self.substeps {
             let at_s = t_s + substep as f64 * self.period_s / self.substeps as f64;
             self.plant.solve(&torques).map_err(|lost| (at_s, lost))?;
             if substep == 0 {
                 // 5: record.
-                samples.push(self.sample(t_s, applied));
-                torques = *applied;
+                samples.push(self.sample(t_s, &now));
+                torques = now;
             }
             self.plant.advance();
         }

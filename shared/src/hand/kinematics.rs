@@ -70,19 +70,12 @@ impl<T: Real, const J: usize, const F: usize> Hand<T, J, F> {
         for (k, (joint, angle)) in self.joints.iter().zip(angles_rad).take(self.joint_count).enumerate() {
             let parent = joint.parent.and_then(|parent| posture.links.get(parent)).unwrap_or(&base);
             let origin_m = parent.point(&joint.offset_m);
-            let zero = match &joint.attitude {
-                Some(attitude) => parent.attitude * attitude,
-                None => parent.attitude,
+            let attitude = match &joint.attitude {
+                Some(attitude) => turned(&(parent.attitude * attitude), *angle),
+                None => turned(&parent.attitude, *angle),
             };
-            let (sine, cosine) = angle.sine_cosine();
-            let (x, y) = (zero.column(0), zero.column(1));
-            let turned = Matrix3::from_columns(&[
-                x * cosine + y * sine,
-                y * cosine - x * sine,
-                zero.column(2).into_owned(),
-            ]);
             if let Some(pose) = posture.links.get_mut(k) {
-                *pose = LinkPose { origin_m, attitude: turned };
+                *pose = LinkPose { origin_m, attitude };
             }
         }
         for (i, fingertip) in self.fingertips.iter().take(self.fingertip_count).enumerate() {
@@ -157,4 +150,12 @@ impl<T: Real, const J: usize, const F: usize> Hand<T, J, F> {
     pub fn gravity_torques(&self, posture: &Posture<T, J, F>, gravity_m_s2: &Vector3<T>) -> [T; J] {
         self.joint_torques(posture, &[Wrench::zero(); F], Some(gravity_m_s2))
     }
+}
+
+/// A frame after a turn about its own z axis.
+#[inline]
+fn turned<T: Real>(frame: &Matrix3<T>, angle_rad: T) -> Matrix3<T> {
+    let (sine, cosine) = angle_rad.sine_cosine();
+    let (x, y) = (frame.column(0), frame.column(1));
+    Matrix3::from_columns(&[x * cosine + y * sine, y * cosine - x * sine, frame.column(2).into_owned()])
 }
