@@ -392,8 +392,9 @@ fn normal_only_knows_no_latch() {
             assert_eq!(torques, approach);
             assert_eq!(monitor.attitude_potential_j, 0.0);
         }
-        let mut wrenches = case.law.approach_wrenches(&case.hand, &posture);
-        let expected = case.hand.joint_torques(&posture, &wrenches, Some(&case.gravity));
+        let weight = case.hand.gravity_torques(&posture, &case.gravity);
+        let pulls = case.hand.fingertip_torques(&posture, &case.law.approach_wrenches(&case.hand, &posture));
+        let expected: [f64; JOINTS] = std::array::from_fn(|k| pulls[k] + weight[k]);
         let still = normal_only.torques(
             &case.hand,
             &posture,
@@ -401,9 +402,8 @@ fn normal_only_knows_no_latch() {
             Some(Grip { latch: &latches[0], force_share: 1.0, attitude_share: 1.0 }),
         );
         assert_eq!(still.0, expected);
-        wrenches = [Wrench::zero(); FINGERS];
         let released = case.law.torques(&case.hand, &posture, &[0.0; JOINTS], None).0;
-        assert_eq!(released, case.hand.joint_torques(&posture, &wrenches, Some(&case.gravity)));
+        assert_eq!(released, weight);
         case.speeds = [0.0; JOINTS];
         assert_eq!(case.torques(&case.speeds, (0.0, 0.0)), released);
     }

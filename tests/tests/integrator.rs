@@ -172,7 +172,7 @@ fn energy_falls_by_what_the_dampers_take() {
         let [coarse, fine] = steps_s.map(|h| {
             let ledger = ledger(&grasp, h, 10.0);
             println!(
-                "{name}, h {h:.0e} s: {:.4} J -> {:.4} J; largest rise {:.1e} J; error of the run {:.1e} J, of a step {:.1e} J",
+                "{name}, h {h:.0e} s: {:.4} J -> {:.4} J; largest rise {:.1e} J; errors: run {:.1e} J, step {:.1e} J",
                 ledger.initial_j, ledger.final_j, ledger.rise_j, ledger.error_j, ledger.step_error_j
             );
             assert!(ledger.rise_j <= c * h * h * h);

@@ -30,7 +30,7 @@ pub(crate) struct Arguments {
     #[arg(long)]
     json: bool,
     /// Simulated time, s, in place of the scene's
-    #[arg(long, value_name = "S")]
+    #[arg(long, value_name = "S", allow_negative_numbers = true)]
     duration: Option<f64>,
     /// Change a value of the scene, such as control.force_n=4 (may be repeated)
     #[arg(long = "set", value_name = "KEY=VALUE")]

@@ -89,6 +89,8 @@ impl Everything {
 #[derive(Clone, Debug)]
 pub(super) struct Coupling {
     branches: Branches,
+    /// How many fingers touch the object: the first ones.
+    contacts: usize,
     rows: [Row; MAX_ROWS],
     /// Right-hand sides, then multipliers.
     multipliers: [f64; MAX_ROWS],
@@ -102,9 +104,10 @@ pub(super) struct Coupling {
 }
 
 impl Coupling {
-    pub(super) fn new(hand: &Hand) -> Self {
+    pub(super) fn new(hand: &Hand, contacts: usize) -> Self {
         Self {
             branches: Branches::of(hand),
+            contacts,
             rows: [NO_ROW; MAX_ROWS],
             multipliers: [0.0; MAX_ROWS],
             finger_factors: [[[0.0; MAX_CHAIN]; MAX_CHAIN]; MAX_FINGERS],
@@ -242,7 +245,7 @@ impl Coupling {
     /// and torsion are driven to `J v + E lambda = 0`, indentation to `J (v - v0) + lambda = 0`. Returns the least
     /// relative pivot of the Delassus matrix; the velocities are meaningless unless it is positive.
     pub(super) fn solve(&mut self, v: &mut Everything, forces: &Everything, tau_s: f64) -> f64 {
-        let fingers = self.branches.fingers.len();
+        let fingers = self.contacts;
         let head = self.branches.trunk.len() + OBJECT;
         let count = Rows::COUNT * fingers;
         let mut push = *forces;
@@ -322,7 +325,7 @@ impl Coupling {
     /// Adds `(L^-1 J^T) lambda` to whitened forces.
     fn add_multipliers(&self, y: &mut Everything) {
         let trunk = self.branches.trunk.len();
-        for (i, finger) in self.branches.fingers.iter().enumerate() {
+        for (i, finger) in self.branches.fingers.iter().enumerate().take(self.contacts) {
             for a in 0..Rows::COUNT {
                 let (row, lambda) = (&self.rows[Rows::COUNT * i + a], self.multipliers[Rows::COUNT * i + a]);
                 for (a, &j) in finger.iter().enumerate() {

@@ -1,7 +1,7 @@
 //! How the plant advances in time.
 //!
 //! Positions live at whole steps, velocities at half steps between them (leapfrog). At each whole step the velocities
-//! `v` of *that instant* are solved for together with the multipliers ([`super::coupling`]), as half a step of the implicit
+//! `v` of *that instant* are solved for together with the multipliers (`coupling.rs`), as half a step of the implicit
 //! Euler rule from the half-step velocities before, with the rolling constraint `P v = 0` (Eq. 25) exact; reflecting
 //! the old half-step velocities about `v` gives the new ones, which carry the positions to the next whole step. That is
 //! the implicit midpoint rule for everything linear in the velocities and the nonholonomic leapfrog of McLachlan and
@@ -69,7 +69,7 @@ impl Plant {
         let inertia_kg_m2 = world_inertia(&model.object.inertia_kg_m2, &motion.attitude);
         let fingers = model.faces.len();
         let mut plant = Self {
-            coupling: Coupling::new(&model.hand),
+            coupling: Coupling::new(&model.hand, fingers),
             posture: Posture::at_base(),
             bodies: [Body::NONE; MAX_JOINTS],
             mass: [[0.0; MAX_JOINTS]; MAX_JOINTS],

@@ -14,7 +14,7 @@ pub enum RunDirError {
         path: PathBuf,
     },
     /// The file system said no.
-    #[error("{}: {source}; nothing more was written there", path.display())]
+    #[error("cannot write {}", path.display())]
     Io {
         /// The file or directory.
         path: PathBuf,
@@ -30,20 +30,15 @@ pub struct RunDir {
 }
 
 impl RunDir {
-    /// Chooses a directory; nothing is written yet. With `force`, files of an earlier run are overwritten, others left.
+    /// Chooses a directory. With `force`, files of an earlier run are overwritten, others left. Nothing is written yet: what
+    /// can't be written is found out after the run, when its summary is safe.
     ///
     /// # Errors
-    /// The directory is not empty (without `force`), or is none.
+    /// The directory is not empty, without `force`.
     pub fn choose(path: &Path, force: bool) -> Result<Self, RunDirError> {
         let path = path.to_owned();
-        match fs::read_dir(&path) {
-            Ok(mut entries) => match entries.next() {
-                Some(_) if !force => Err(RunDirError::Occupied { path }),
-                _ => Ok(Self { path }),
-            },
-            Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(Self { path }),
-            Err(source) => Err(RunDirError::Io { path, source }),
-        }
+        let occupied = fs::read_dir(&path).is_ok_and(|mut entries| entries.next().is_some());
+        if occupied && !force { Err(RunDirError::Occupied { path }) } else { Ok(Self { path }) }
     }
 
     /// The directory.

@@ -53,7 +53,7 @@ pub struct Simulation {
     name: String,
     joints: usize,
     ticks: u64,
-    period_s: f64,
+    period_us: u64,
     substeps: usize,
     torque_limits_nm: JointVector,
     delayed: bool,
@@ -82,7 +82,7 @@ impl Simulation {
             name: scene.name.clone(),
             joints: scene.hand.joint_count(),
             ticks: (scene.duration_s / scene.control.period_s).round() as u64,
-            period_s: scene.control.period_s,
+            period_us: (scene.control.period_s * 1e6).round() as u64,
             substeps: scene.substeps,
             torque_limits_nm,
             delayed: scene.actuators.output_delay_ticks > 0,
@@ -99,7 +99,7 @@ impl Simulation {
         let mut applied = None;
         let mut lost = None;
         for tick in 0..=self.ticks {
-            let t_s = tick as f64 * self.period_s;
+            let t_s = self.time_s(tick);
             if tick % 100 == 0 {
                 progress(t_s);
             }
@@ -108,11 +108,16 @@ impl Simulation {
                 break;
             }
         }
-        let duration_s = lost.map_or(self.ticks as f64 * self.period_s, |(t_s, _)| t_s);
+        let duration_s = lost.map_or(self.time_s(self.ticks), |(t_s, _)| t_s);
         let wall_s = begun.elapsed().as_secs_f64();
         let fault = self.controller.fault();
         let summary = Summary::of(Ending { scene: self.name, duration_s, lost, fault, wall_s }, &samples);
         Run { samples, summary }
+    }
+
+    /// Time of a tick, s. From whole microseconds, so that it prints as what it is.
+    fn time_s(&self, tick: u64) -> f64 {
+        (tick * self.period_us) as f64 / 1e6
     }
 
     /// One control period that begins at `t_s`. `applied` are the torques on the joints, before (if there was a before) and
@@ -136,7 +141,7 @@ impl Simulation {
         // either side: it gets their mean, which keeps the integrator's second order.
         let mut torques: JointVector = std::array::from_fn(|k| 0.5 * (before[k] + now[k]));
         for substep in 0..self.substeps {
-            let at_s = t_s + substep as f64 * self.period_s / self.substeps as f64;
+            let at_s = t_s + (self.period_us * substep as u64) as f64 / (1e6 * self.substeps as f64);
             self.plant.solve(&torques).map_err(|lost| (at_s, lost))?;
             if substep == 0 {
                 // 5: record.

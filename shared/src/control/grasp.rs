@@ -19,6 +19,7 @@
 //! - `V_st` has the constant `3 N K_st` added, so that it is zero at the latch and never negative: the energy is then
 //!   bounded for every `K_st`, and the condition of Eq. 49 is a sizing rule only.
 
+use crate::hand::frame::product_transposed;
 use crate::hand::{Hand, Posture, Wrench};
 use crate::math::Real;
 use core::fmt;
@@ -170,7 +171,12 @@ impl<T: Real, const J: usize> GraspLaw<T, J> {
                     hold_attitudes(hand, posture, grip.latch, stiffness, &mut wrenches);
             }
         }
-        let mut torques = hand.joint_torques(posture, &wrenches, self.gravity_m_s2.as_ref());
+        let mut torques = hand.fingertip_torques(posture, &wrenches);
+        if let Some(gravity) = &self.gravity_m_s2 {
+            for (torque, weight) in torques.iter_mut().zip(hand.gravity_torques(posture, gravity)) {
+                *torque += weight;
+            }
+        }
         for ((torque, speed), damping) in torques.iter_mut().zip(speeds_rad_s).zip(&self.damping_nm_s) {
             *torque -= *damping * *speed;
         }
@@ -231,11 +237,12 @@ fn hold_attitudes<T: Real, const J: usize, const F: usize>(
     wrenches: &mut [Wrench<T>; F],
 ) -> T {
     let count = hand.fingertip_count().min(F);
+    // How far each fingertip turned since the latch, D_i.
     let mut turns = [Matrix3::identity(); F];
     for (turn, (now, then)) in
         turns.iter_mut().zip(posture.attitudes.iter().zip(&latch.attitudes)).take(count)
     {
-        *turn = now * then.transpose();
+        *turn = product_transposed(now, then);
     }
     let mut missing_traces = T::zero();
     for i in 0..count {

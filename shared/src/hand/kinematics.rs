@@ -1,5 +1,6 @@
 //! Forward kinematics, fingertip Jacobians (Eq. 11), and products with their transposes.
 
+use super::frame::{cross, dot, product, turn_about_z, turn_vector, z_axis};
 use super::model::Hand;
 use crate::math::Real;
 use nalgebra::{Matrix3, SMatrix, Vector3};
@@ -17,13 +18,13 @@ impl<T: Real> LinkPose<T> {
     /// Unit vector along the joint axis.
     #[inline]
     pub fn axis(&self) -> Vector3<T> {
-        self.attitude.column(2).into_owned()
+        z_axis(&self.attitude)
     }
 
     /// A point of the link in the base frame, m.
     #[inline]
     pub fn point(&self, local_m: &Vector3<T>) -> Vector3<T> {
-        self.origin_m + self.attitude * local_m
+        self.origin_m + turn_vector(&self.attitude, local_m)
     }
 }
 
@@ -47,12 +48,12 @@ impl<T: Real, const J: usize, const F: usize> Posture<T, J, F> {
     }
 }
 
-/// A force and a moment that act at a fingertip's centre, in the base frame.
+/// A force and a moment about the point where it acts, in the base frame; for a fingertip its centre.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Wrench<T> {
     /// Force, N.
     pub force_n: Vector3<T>,
-    /// Moment about the fingertip's centre, N m.
+    /// Moment, N m.
     pub moment_nm: Vector3<T>,
 }
 
@@ -67,16 +68,17 @@ impl<T: Real, const J: usize, const F: usize> Hand<T, J, F> {
     /// Places every link and fingertip for the joint angles `q`, rad.
     pub fn forward_kinematics(&self, angles_rad: &[T; J], posture: &mut Posture<T, J, F>) {
         let base = LinkPose { origin_m: Vector3::zeros(), attitude: Matrix3::identity() };
-        for (k, (joint, angle)) in self.joints.iter().zip(angles_rad).take(self.joint_count).enumerate() {
+        // All sines and cosines first: they are independent, and a machine with vector registers computes several at once.
+        let turns = angles_rad.map(Real::sine_cosine);
+        for k in 0..self.joint_count.min(J) {
+            let (joint, (sine, cosine)) = (&self.joints[k], turns[k]);
             let parent = joint.parent.and_then(|parent| posture.links.get(parent)).unwrap_or(&base);
             let origin_m = parent.point(&joint.offset_m);
             let attitude = match &joint.attitude {
-                Some(attitude) => turned(&(parent.attitude * attitude), *angle),
-                None => turned(&parent.attitude, *angle),
+                Some(attitude) => turn_about_z(&product(&parent.attitude, attitude), sine, cosine),
+                None => turn_about_z(&parent.attitude, sine, cosine),
             };
-            if let Some(pose) = posture.links.get_mut(k) {
-                *pose = LinkPose { origin_m, attitude };
-            }
+            posture.links[k] = LinkPose { origin_m, attitude };
         }
         for (i, fingertip) in self.fingertips.iter().take(self.fingertip_count).enumerate() {
             if let (Some(pose), Some(centre), Some(attitude)) = (
@@ -108,54 +110,37 @@ impl<T: Real, const J: usize, const F: usize> Hand<T, J, F> {
         (linear, angular)
     }
 
-    /// Joint torques (N m) that hold the weight of the links in `gravity_m_s2` and put `wrenches` on the fingertips:
-    /// `g(q) + sum(J_i^T F_i + J_Omega i^T M_i)`.
-    ///
-    /// One pass from the fingertips to the base, without forming a Jacobian: each joint sees the wrench of everything
-    /// that it carries, taken about the origin of the base frame.
-    pub fn joint_torques(
-        &self,
-        posture: &Posture<T, J, F>,
-        wrenches: &[Wrench<T>; F],
-        gravity_m_s2: Option<&Vector3<T>>,
-    ) -> [T; J] {
-        let mut carried = [Wrench::zero(); J];
-        for (i, (fingertip, wrench)) in
-            self.fingertips.iter().zip(wrenches).take(self.fingertip_count).enumerate()
-        {
-            if let (Some(link), Some(centre)) = (carried.get_mut(fingertip.link), posture.centres_m.get(i)) {
-                link.force_n += wrench.force_n;
-                link.moment_nm += wrench.moment_nm + centre.cross(&wrench.force_n);
-            }
-        }
+    /// Joint torques that put wrenches on the fingertips, `sum(J_i^T F_i + J_Omega i^T M_i)`, N m, without forming a Jacobian.
+    pub fn fingertip_torques(&self, posture: &Posture<T, J, F>, wrenches: &[Wrench<T>; F]) -> [T; J] {
         let mut torques = [T::zero(); J];
-        for k in (0..self.joint_count.min(J)).rev() {
-            let (joint, pose) = (&self.joints[k], &posture.links[k]);
-            let mut wrench = carried[k];
-            if let Some(gravity) = gravity_m_s2 {
-                let support = -gravity * joint.link.mass_kg;
-                wrench.force_n += support;
-                wrench.moment_nm += pose.point(&joint.link.mass_centre_m).cross(&support);
-            }
-            torques[k] = pose.axis().dot(&(wrench.moment_nm - pose.origin_m.cross(&wrench.force_n)));
-            if let Some(parent) = joint.parent.and_then(|parent| carried.get_mut(parent)) {
-                parent.force_n += wrench.force_n;
-                parent.moment_nm += wrench.moment_nm;
+        let placed = wrenches.iter().zip(&posture.centres_m);
+        for (fingertip, (wrench, centre)) in self.fingertips.iter().zip(placed).take(self.fingertip_count) {
+            let mut below = Some(fingertip.link);
+            while let Some(k) = below.filter(|&k| k < J) {
+                let pose = &posture.links[k];
+                let moment = wrench.moment_nm + cross(&(centre - pose.origin_m), &wrench.force_n);
+                torques[k] += dot(&pose.axis(), &moment);
+                below = self.joints[k].parent;
             }
         }
         torques
     }
 
-    /// Joint torques `g(q)` that hold the weight of the links, N m.
+    /// Joint torques `g(q)` that hold the weight of the links, N m. One pass from the fingertips to the base, which carries
+    /// the first moment of everything above each joint.
     pub fn gravity_torques(&self, posture: &Posture<T, J, F>, gravity_m_s2: &Vector3<T>) -> [T; J] {
-        self.joint_torques(posture, &[Wrench::zero(); F], Some(gravity_m_s2))
+        let mut torques = [T::zero(); J];
+        let upwards = -gravity_m_s2;
+        let mut carried = [Vector3::zeros(); J];
+        for k in (0..self.joint_count.min(J)).rev() {
+            let (joint, pose) = (&self.joints[k], &posture.links[k]);
+            let moment = carried[k] + turn_vector(&pose.attitude, &joint.first_moment_kg_m);
+            torques[k] = dot(&pose.axis(), &cross(&moment, &upwards));
+            let parent = joint.parent.unwrap_or(J);
+            if let (Some(below), Some(carried)) = (posture.links.get(parent), carried.get_mut(parent)) {
+                *carried += moment + (pose.origin_m - below.origin_m) * joint.carried_kg;
+            }
+        }
+        torques
     }
-}
-
-/// A frame after a turn about its own z axis.
-#[inline]
-fn turned<T: Real>(frame: &Matrix3<T>, angle_rad: T) -> Matrix3<T> {
-    let (sine, cosine) = angle_rad.sine_cosine();
-    let (x, y) = (frame.column(0), frame.column(1));
-    Matrix3::from_columns(&[x * cosine + y * sine, y * cosine - x * sine, frame.column(2).into_owned()])
 }

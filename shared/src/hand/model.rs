@@ -142,6 +142,10 @@ pub(super) struct PreparedJoint<T> {
     pub(super) lower_rad: T,
     pub(super) upper_rad: T,
     pub(super) link: Link<T>,
+    /// Mass of the link times its centre, kg m.
+    pub(super) first_moment_kg_m: Vector3<T>,
+    /// Mass of everything that the joint carries, kg.
+    pub(super) carried_kg: T,
 }
 
 /// A hand, checked and prepared: at most `J` joints and `F` fingertips.
@@ -174,6 +178,12 @@ impl<T: Real, const J: usize, const F: usize> Hand<T, J, F> {
                 None => Matrix3::identity(),
             };
             hand.joints[k] = PreparedJoint::new(joint, &parent_from_link);
+        }
+        for k in (0..hand.joint_count).rev() {
+            if let Some(parent) = hand.joints[k].parent {
+                let carried_kg = hand.joints[k].carried_kg;
+                hand.joints[parent].carried_kg += carried_kg;
+            }
         }
         for (i, fingertip) in fingertips.iter().enumerate() {
             check_fingertip(i, fingertip, joints.len())?;
@@ -286,15 +296,19 @@ impl<T: Real> PreparedJoint<T> {
                 mass_centre_m: Vector3::zeros(),
                 inertia_kg_m2: Matrix3::zeros(),
             },
+            first_moment_kg_m: Vector3::zeros(),
+            carried_kg: T::zero(),
         }
     }
 
     fn new(joint: &Joint<T>, parent_from_link: &Matrix3<T>) -> Self {
         let to_parent = parent_from_link.transpose();
-        let axis = to_parent * (joint.attitude * joint.axis) / norm(&joint.axis);
+        let axis = to_parent * (joint.attitude * joint.axis);
+        let axis = axis / norm(&axis);
         let attitude = rotation_from_z(&axis);
         let from_link =
             joint.attitude.transpose() * parent_from_link * attitude.unwrap_or(Matrix3::identity());
+        let mass_centre_m = from_link.transpose() * joint.link.mass_centre_m;
         Self {
             parent: joint.parent,
             offset_m: to_parent * joint.offset_m,
@@ -304,9 +318,11 @@ impl<T: Real> PreparedJoint<T> {
             upper_rad: joint.upper_rad,
             link: Link {
                 mass_kg: joint.link.mass_kg,
-                mass_centre_m: from_link.transpose() * joint.link.mass_centre_m,
+                mass_centre_m,
                 inertia_kg_m2: from_link.transpose() * joint.link.inertia_kg_m2 * from_link,
             },
+            first_moment_kg_m: mass_centre_m * joint.link.mass_kg,
+            carried_kg: joint.link.mass_kg,
         }
     }
 
@@ -323,6 +339,8 @@ impl<T: Real> PreparedJoint<T> {
                 mass_centre_m: cast(&self.link.mass_centre_m),
                 inertia_kg_m2: self.link.inertia_kg_m2.map(|v| U::from_f64(v.to_f64())),
             },
+            first_moment_kg_m: cast(&self.first_moment_kg_m),
+            carried_kg: U::from_f64(self.carried_kg.to_f64()),
         }
     }
 }

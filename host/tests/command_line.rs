@@ -1,0 +1,294 @@
+//! `blindgrasp sim` as a user meets it: what it prints, what it writes, and what it says to bad input.
+
+use serde_json::Value;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+fn blindgrasp(arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_blindgrasp")).args(arguments).output().expect("the command starts")
+}
+
+fn text(bytes: &[u8]) -> String {
+    String::from_utf8(bytes.to_vec()).expect("UTF-8")
+}
+
+/// A directory that goes with the test.
+struct Folder(PathBuf);
+
+impl Folder {
+    fn new(name: &str) -> Self {
+        let path = std::env::temp_dir().join(format!("blindgrasp-{}-{name}", std::process::id()));
+        let _ = fs::remove_dir_all(&path);
+        fs::create_dir_all(&path).expect("a directory");
+        Self(path)
+    }
+
+    fn write(&self, name: &str, text: &str) -> String {
+        let path = self.0.join(name);
+        fs::write(&path, text).expect("a file");
+        path.to_str().expect("UTF-8").to_owned()
+    }
+
+    fn path(&self, name: &str) -> String {
+        self.0.join(name).to_str().expect("UTF-8").to_owned()
+    }
+}
+
+impl Drop for Folder {
+    fn drop(&mut self) {
+        let _ = fs::remove_dir_all(&self.0);
+    }
+}
+
+/// Exit code 2, nothing on stdout, and one line on stderr with all of these words in it.
+fn assert_refused(arguments: &[&str], words: &[&str]) {
+    let output = blindgrasp(arguments);
+    let error = text(&output.stderr);
+    assert_eq!(output.status.code(), Some(2), "{arguments:?}: {error}");
+    assert!(output.stdout.is_empty(), "{arguments:?}");
+    let lines: Vec<&str> = error.lines().filter(|line| !line.contains("warning")).collect();
+    assert_eq!(lines.len(), 1, "{arguments:?}: {error}");
+    for word in words {
+        assert!(lines[0].contains(word), "{arguments:?}: no `{word}` in: {error}");
+    }
+}
+
+#[test]
+fn json_is_one_object_with_every_field() {
+    let output = blindgrasp(&["sim", "prism-ideal", "--json", "--duration", "0.2"]);
+    assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
+    assert!(output.stderr.is_empty(), "{}", text(&output.stderr));
+    let summary: Value = serde_json::from_slice(&output.stdout).expect("one JSON object");
+    for key in [
+        "scene",
+        "duration_s",
+        "settled",
+        "settle_time_s",
+        "grasp_held",
+        "lost_at_s",
+        "lost_reason",
+        "final",
+        "friction_demand_max",
+        "energy",
+        "wall_s",
+        "real_time_factor",
+    ] {
+        assert!(summary.get(key).is_some(), "{key}");
+    }
+    for key in [
+        "joint_speed_max_rad_s",
+        "object_speed_m_s",
+        "object_spin_rad_s",
+        "force_residual_n",
+        "moment_residual_nm",
+    ] {
+        assert!(summary["final"][key].is_f64(), "{key}");
+    }
+    for key in ["normal_force_n", "desired_normal_force_n", "tangential_force_n", "indentation_m"] {
+        assert_eq!(summary["final"][key].as_array().map(Vec::len), Some(3), "{key}");
+    }
+    for key in ["initial_j", "final_j", "increase_max_j"] {
+        assert!(summary["energy"][key].is_f64(), "{key}");
+    }
+    assert_eq!(summary["duration_s"], 0.2);
+    assert_eq!(summary["lost_at_s"], Value::Null);
+}
+
+#[test]
+fn exit_code_says_whether_the_grasp_held() {
+    let held = blindgrasp(&["sim", "cube"]);
+    assert_eq!(held.status.code(), Some(0));
+    assert!(text(&held.stdout).contains("held"));
+    let lost = blindgrasp(&["sim", "cube-normal-only"]);
+    assert_eq!(lost.status.code(), Some(1));
+    assert!(text(&lost.stdout).contains("LOST") && text(&lost.stdout).contains("finger"));
+}
+
+#[test]
+fn out_writes_every_file_and_the_scene_reproduces_the_run() {
+    let folder = Folder::new("out");
+    let (first, second) = (folder.path("first"), folder.path("second"));
+    let changed = ["--set", "control.force_n=4.5", "--duration", "0.3", "--set", "sensors.noise_counts=0.3"];
+    let output = blindgrasp(&[&["sim", "cube", "--out", &first], &changed[..]].concat());
+    assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
+    for name in [
+        "summary.json",
+        "scene.toml",
+        "trace.csv",
+        "grasp.gif",
+        "grasp-start.png",
+        "grasp-end.png",
+        "joint-velocities.png",
+        "joint-velocities.svg",
+        "object-velocities.png",
+        "object-velocities.svg",
+        "contact-forces.png",
+        "contact-forces.svg",
+        "residuals.png",
+        "residuals.svg",
+    ] {
+        assert!(Path::new(&first).join(name).metadata().is_ok_and(|file| file.len() > 100), "{name}");
+    }
+    let trace = fs::read_to_string(Path::new(&first).join("trace.csv")).expect("a trace");
+    let mut lines = trace.lines();
+    let header: Vec<&str> = lines.next().expect("a header").split(',').collect();
+    let mut expected = vec!["t_s".to_owned()];
+    for quantity in ["q", "dq", "q_est", "dq_est", "u"] {
+        expected.extend((1..=12).map(|k| format!("{quantity}_{k}")));
+    }
+    expected.extend("x y z qw qx qy qz vx vy vz wx wy wz".split(' ').map(str::to_owned));
+    for finger in 1..=3 {
+        let quantities = "f_N lambda_x lambda_z dr foot_x foot_z".split(' ');
+        expected.extend(quantities.map(|quantity| format!("{quantity}_{finger}")));
+    }
+    expected.extend(["energy_j".to_owned(), "mode".to_owned()]);
+    assert_eq!(header, expected);
+    assert_eq!(lines.clone().count(), 301, "a row a control tick, and the start");
+    assert!(lines.clone().all(|line| line.split(',').count() == header.len()));
+    assert!(lines.all(|line| line.ends_with(",grasping")));
+
+    let scene = Path::new(&first).join("scene.toml");
+    let output = blindgrasp(&["sim", scene.to_str().expect("UTF-8"), "--out", &second]);
+    assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
+    let again = fs::read_to_string(Path::new(&second).join("trace.csv")).expect("a trace");
+    assert!(trace == again, "the effective scene reproduces the run, byte for byte");
+}
+
+#[test]
+fn another_run_is_overwritten_only_by_force() {
+    let folder = Folder::new("force");
+    folder.write("notes.txt", "mine");
+    let out = folder.path("");
+    assert_refused(&["sim", "prism", "--duration", "0.01", "--out", &out], &["not empty", "--force"]);
+    let output = blindgrasp(&["sim", "prism", "--duration", "0.01", "--out", &out, "--force"]);
+    assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
+    assert!(folder.0.join("summary.json").exists());
+    assert_eq!(fs::read_to_string(folder.0.join("notes.txt")).expect("a file"), "mine", "other files stay");
+}
+
+#[test]
+fn what_can_not_be_written_is_said_after_the_summary() {
+    let folder = Folder::new("blocked");
+    // A file where a directory has to be: this stops root too.
+    let blocked = folder.write("file", "") + "/run";
+    let output = blindgrasp(&["sim", "prism", "--duration", "0.01", "--json", "--out", &blocked]);
+    assert_eq!(output.status.code(), Some(2));
+    let summary: Value = serde_json::from_slice(&output.stdout).expect("the summary is printed all the same");
+    assert_eq!(summary["scene"], "prism");
+    let error = text(&output.stderr);
+    assert!(error.contains(&blocked) && error.lines().count() == 1, "{error}");
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn a_full_disk_is_said_after_the_summary() {
+    let folder = Folder::new("full");
+    fs::create_dir(folder.path("run")).expect("a directory");
+    // Every byte that is written to this device fails as on a full disk.
+    std::os::unix::fs::symlink("/dev/full", folder.path("run/trace.csv")).expect("a link");
+    let out = folder.path("run");
+    let output = blindgrasp(&["sim", "prism", "--duration", "0.05", "--out", &out, "--force"]);
+    assert_eq!(output.status.code(), Some(2));
+    assert!(text(&output.stdout).contains("prism"), "the summary is printed all the same");
+    let error = text(&output.stderr);
+    assert!(error.contains("trace.csv") && error.contains("No space left"), "{error}");
+}
+
+#[test]
+fn usage_errors_have_exit_code_2() {
+    for arguments in [
+        &[][..],
+        &["sim"],
+        &["sin", "cube"],
+        &["sim", "cube", "--durations", "1"],
+        &["sim", "cube", "--force"],
+    ] {
+        assert_eq!(blindgrasp(arguments).status.code(), Some(2), "{arguments:?}");
+    }
+    assert_eq!(blindgrasp(&["--version"]).status.code(), Some(0));
+}
+
+#[test]
+fn settings_that_are_none_are_refused() {
+    assert_refused(
+        &["sim", "cube", "--set", "control.forc_n=4"],
+        &["control.forc_n", "did you mean", "force_n"],
+    );
+    assert_refused(&["sim", "cube", "--set", "control.force_n"], &["--set", "control.force_n"]);
+    assert_refused(&["sim", "cube", "--set", "control.force_n=strong"], &["control.force_n"]);
+    assert_refused(&["sim", "cube", "--set", "control.force_n=nan"], &["control.force_n"]);
+    assert_refused(&["sim", "cube", "--duration", "-1"], &["duration_s"]);
+    assert_refused(&["sim", "cube", "--duration", "nan"], &["duration_s"]);
+    assert_refused(&["sim", "cubes"], &["cubes", "cube"]);
+    assert_refused(&["sim", "nowhere/scene.toml"], &["nowhere/scene.toml"]);
+}
+
+/// The shipped scene in one file, to be damaged.
+fn whole_scene() -> String {
+    let folder = Folder::new("whole");
+    let out = folder.path("run");
+    assert_eq!(blindgrasp(&["sim", "cube", "--duration", "0.01", "--out", &out]).status.code(), Some(0));
+    fs::read_to_string(folder.0.join("run/scene.toml")).expect("the effective scene")
+}
+
+#[test]
+fn bad_scene_files_are_refused_with_file_key_and_remedy() {
+    let folder = Folder::new("bad");
+    let whole = whole_scene();
+    let cases: &[(&str, &str, &str, &[&str])] = &[
+        ("broken TOML", "[control]", "[control", &["bad.toml:"]),
+        ("unknown key", "soft_start_s", "soft_strat_s", &["soft_strat_s", "did you mean", "soft_start_s"]),
+        ("negative mass", "mass_kg = 0.038", "mass_kg = -0.038", &["mass_kg"]),
+        ("non-unit axis", "axis = [1.0, 0.0, 0.0]", "axis = [1.0, 0.5, 0.0]", &["axis", "unit vector"]),
+        ("not a number", "substep_s = 0.0001", "substep_s = nan", &["plant.substep_s"]),
+        (
+            "object without volume",
+            "size_m = [0.048, 0.048, 0.048]",
+            "size_m = [0.048, 0.048, 0.0]",
+            &["size_m"],
+        ),
+        (
+            "step that does not divide",
+            "substep_s = 0.0001",
+            "substep_s = 0.0003",
+            &["plant.substep_s", "divide"],
+        ),
+        (
+            "unreachable",
+            "position_m = [0.0, 0.0, 0.125]",
+            "position_m = [0.0, 0.0, 0.5]",
+            &["finger-1", "mm away"],
+        ),
+        ("another format", "schema = 1", "schema = 99", &["schema", "99"]),
+    ];
+    for (what, from, to, words) in cases {
+        assert!(whole.contains(from), "{what}: the scene has no `{from}`");
+        let path = folder.write("bad.toml", &whole.replacen(from, to, 1));
+        assert_refused(&["sim", &path], &[&["bad.toml"], *words].concat());
+    }
+    // Zero fingers: no fingertip, no contact.
+    let start = whole.find("[[hand.fingertip]]").expect("fingertips");
+    let end = whole[start..].find("\n[object]").map_or(whole.len(), |at| start + at);
+    let fingerless = whole[..start].to_owned() + &whole[end..];
+    let path = folder.write("bad.toml", &fingerless);
+    assert_refused(&["sim", &path], &["bad.toml", "fingertip"]);
+    // Not text at all.
+    let path = folder.path("bad.toml");
+    fs::write(&path, [0xff, 0xfe, 0x00, 0x80]).expect("a file");
+    assert_refused(&["sim", &path], &["bad.toml"]);
+    assert_refused(&["sim", &folder.path("missing.toml")], &["missing.toml"]);
+}
+
+/// An inertia that no body has is a warning while it can be simulated, an error when not.
+#[test]
+fn impossible_inertias_warn_or_are_refused() {
+    let odd = "object.inertia_kg_m2=[1e-6, 1e-6, 5e-6]";
+    let output = blindgrasp(&["sim", "cube-ideal", "--duration", "0.01", "--set", odd]);
+    assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
+    assert!(text(&output.stderr).contains("warning"), "{}", text(&output.stderr));
+    assert_refused(
+        &["sim", "cube-ideal", "--set", "object.inertia_kg_m2=[1e-6, 1e-6, -1e-6]"],
+        &["object.inertia_kg_m2"],
+    );
+}
