@@ -50,12 +50,12 @@ fn controller(criterion: &mut Criterion) {
     hand.forward_kinematics(&angles, &mut posture);
     let latch = Latch::of(&posture);
     let speeds = [0.01; J];
-    criterion.bench_function("forward kinematics and law (f32, 12 joints)", |bencher| {
-        bencher.iter(|| {
-            hand.forward_kinematics(black_box(&angles), &mut posture);
-            let grip = Grip { latch: &latch, force_share: 1.0, attitude_share: 1.0 };
-            law.torques(&hand, &posture, black_box(&speeds), Some(grip))
-        });
+    criterion.bench_function("forward kinematics (f32, 12 joints)", |bencher| {
+        bencher.iter(|| hand.forward_kinematics(black_box(&angles), &mut posture));
+    });
+    criterion.bench_function("law with gravity (f32, 12 joints)", |bencher| {
+        let grip = Grip { latch: &latch, force_share: 1.0, attitude_share: 1.0 };
+        bencher.iter(|| law.torques(&hand, black_box(&posture), black_box(&speeds), Some(grip)));
     });
 
     let per_turn = scene.joints[0].encoder_counts_per_turn;

@@ -79,13 +79,28 @@ fn settings(file: &SceneFile) -> Result<usize> {
         }
     }
     let control = &file.control;
-    within("control.period_s", control.period_s, 1e-5, 0.1)?;
+    within("control.period_s", control.period_s, 1e-4, 0.1)?;
+    let microseconds = control.period_s * 1e6;
+    if (microseconds - microseconds.round()).abs() > 1e-6 {
+        return fail(
+            "control.period_s",
+            format!("{:?} s is no whole number of microseconds", control.period_s),
+            format!("{:?} is", microseconds.round() * 1e-6),
+        );
+    }
     within("duration_s", file.duration_s, control.period_s, LONGEST_RUN_S)?;
     within("control.force_n", control.force_n, 1e-6, 1e4)?;
     within("control.attitude_stiffness_nm", control.attitude_stiffness_nm, 0.0, 1e4)?;
     within("control.damping_scale", control.damping_scale, 0.0, 1e4)?;
     within("control.soft_start_s", control.soft_start_s, 0.0, LONGEST_RUN_S)?;
-    within("control.estimator_bandwidth_hz", control.estimator_bandwidth_hz, 0.1, 0.5 / control.period_s)?;
+    // The tick's own bounds, so that the file and the key are named here.
+    let fastest_hz = 1.0 / (std::f64::consts::PI * control.period_s);
+    within(
+        "control.estimator_bandwidth_hz",
+        control.estimator_bandwidth_hz,
+        1e-3 * fastest_hz,
+        0.999 * fastest_hz,
+    )?;
     within("sensors.noise_counts", file.sensors.noise_counts, 0.0, 1e6)?;
     if file.actuators.output_delay_ticks > 1 {
         return fail(

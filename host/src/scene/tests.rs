@@ -95,7 +95,7 @@ fn shipped_objects_are_those_of_table_vi() {
 #[test]
 fn equilibrium_indentation_is_that_of_eq_57() {
     for name in ["prism-ideal", "cube-ideal"] {
-        let scene = load(name, &[]).unwrap();
+        let scene = load(name, &["start.indentation_m=equilibrium"]).unwrap();
         let centres = centres(&scene);
         let middle = centres.iter().sum::<Vector3<f64>>() / 3.0;
         for (i, contact) in scene.contacts.iter().enumerate() {
