@@ -41,8 +41,8 @@
 //! Counts are subtracted as integers, with wrap-around, before anything becomes a float: what the filter keeps are
 //! small numbers, however far the counters have run.
 
-use crate::control::ControlError;
 use crate::math::Real;
+use crate::parameter::ParameterError;
 use crate::period::Period;
 
 /// How the counts of one joint are read.
@@ -70,8 +70,8 @@ impl<T: Real, const J: usize> EstimatorConfig<T, J> {
     ///
     /// # Errors
     /// The first parameter that is out of its range.
-    pub fn prepare(&self, joint_count: usize, period: Period) -> Result<Estimator<T, J>, ControlError> {
-        let fail = |parameter, joint, reason| Err(ControlError { parameter, joint, reason });
+    pub fn prepare(&self, joint_count: usize, period: Period) -> Result<Estimator<T, J>, ParameterError> {
+        let fail = |parameter, joint, reason| Err(ParameterError { parameter, joint, reason });
         let period_s: T = period.seconds();
         let w = T::from_f64(core::f64::consts::PI) * self.bandwidth_hz * period_s;
         if !(w >= T::from_f64(1e-3) && w <= T::one()) {

@@ -6,11 +6,11 @@
 //! Here are the faults that the tick can see by itself. Limits ([`limit`](crate::limit)) are no faults; a joint whose
 //! torque stays at its limit for long is one.
 
-use crate::control::ControlError;
 use crate::estimate::{Estimator, Motion};
 use crate::hand::Hand;
 use crate::limit::{Limit, Limiting};
 use crate::math::Real;
+use crate::parameter::ParameterError;
 use crate::period::Period;
 use core::fmt;
 use serde::{Deserialize, Serialize};
@@ -143,12 +143,12 @@ impl<T: Real, const J: usize> FaultConfig<T, J> {
         hand: &Hand<T, J, F>,
         estimator: &Estimator<T, J>,
         period: Period,
-    ) -> Result<Watch<T, J>, ControlError> {
+    ) -> Result<Watch<T, J>, ParameterError> {
         let joint_count = hand.joint_count().min(J);
         let mut joints = [JointWatch { change: None, speed_rad_s: None, range_rad: None }; J];
         if self.range_slack_rad.is_some_and(|slack| !(slack >= T::zero() && slack.is_finite())) {
             let reason = "has to be zero or positive";
-            return Err(ControlError { parameter: "faults.range_slack_rad", joint: None, reason });
+            return Err(ParameterError { parameter: "faults.range_slack_rad", joint: None, reason });
         }
         for (k, joint) in joints.iter_mut().enumerate().take(joint_count) {
             let positive = |parameter, v: T| {
@@ -156,7 +156,7 @@ impl<T: Real, const J: usize> FaultConfig<T, J> {
                 if v > T::zero() && v.is_finite() {
                     Ok(v)
                 } else {
-                    Err(ControlError { parameter, joint: Some(k), reason })
+                    Err(ParameterError { parameter, joint: Some(k), reason })
                 }
             };
             if let Some(speeds) = self.possible_speed_rad_s {

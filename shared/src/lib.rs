@@ -19,6 +19,7 @@ pub mod fault;
 pub mod hand;
 pub mod limit;
 pub mod math;
+pub mod parameter;
 pub mod period;
 pub mod supervisor;
 pub mod telemetry;

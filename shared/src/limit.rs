@@ -10,9 +10,9 @@
 //! Each can be left out, and each says where it acted ([`Limiting`]). Limits are no faults: a hand that is limited does
 //! what it can.
 
-use crate::control::ControlError;
 use crate::hand::Hand;
 use crate::math::Real;
+use crate::parameter::ParameterError;
 use crate::period::Period;
 use core::fmt;
 use serde::{Deserialize, Serialize};
@@ -157,11 +157,11 @@ impl<T: Real, const J: usize> LimitConfig<T, J> {
         &self,
         hand: &Hand<T, J, F>,
         period: Period,
-    ) -> Result<Limits<T, J>, ControlError> {
+    ) -> Result<Limits<T, J>, ParameterError> {
         let joint_count = hand.joint_count().min(J);
         let mut joints = [JointLimits { torque_nm: None, slew_nm: None, stop: None }; J];
         for (k, joint) in joints.iter_mut().enumerate().take(joint_count) {
-            let fail = |parameter, reason| Err(ControlError { parameter, joint: Some(k), reason });
+            let fail = |parameter, reason| Err(ParameterError { parameter, joint: Some(k), reason });
             if let Some(torque_nm) = self.torque_nm {
                 if !is_positive(torque_nm[k]) {
                     return fail("limits.torque_nm", "has to be positive");
@@ -183,8 +183,8 @@ impl<T: Real, const J: usize> LimitConfig<T, J> {
 }
 
 impl<T: Real, const J: usize> StopConfig<T, J> {
-    fn prepare(&self, joint: usize, range_rad: (T, T)) -> Result<Stop<T>, ControlError> {
-        let fail = |parameter, reason| Err(ControlError { parameter, joint: Some(joint), reason });
+    fn prepare(&self, joint: usize, range_rad: (T, T)) -> Result<Stop<T>, ParameterError> {
+        let fail = |parameter, reason| Err(ParameterError { parameter, joint: Some(joint), reason });
         let (lower, upper) = range_rad;
         let margin = self.margin_rad[joint];
         if !(is_positive(margin) && margin + margin <= upper - lower) {

@@ -1,7 +1,7 @@
 //! The tick period. Time is counted in whole ticks: a float that counts seconds stops advancing after some hours.
 
-use crate::control::ControlError;
 use crate::math::Real;
+use crate::parameter::ParameterError;
 
 /// Longest time that a setting may name, ms: an hour.
 const LONGEST_MS: u32 = 3_600_000;
@@ -17,12 +17,12 @@ impl Period {
     ///
     /// # Errors
     /// A period below 100 us or above 100 ms.
-    pub fn from_us(microseconds: u32) -> Result<Self, ControlError> {
+    pub fn from_us(microseconds: u32) -> Result<Self, ParameterError> {
         if (100..=100_000).contains(&microseconds) {
             Ok(Self { microseconds })
         } else {
             let reason = "has to be from 100 to 100000";
-            Err(ControlError { parameter: "period_us", joint: None, reason })
+            Err(ParameterError { parameter: "period_us", joint: None, reason })
         }
     }
 
@@ -40,9 +40,9 @@ impl Period {
     ///
     /// # Errors
     /// A time above an hour; `parameter` is what the error names.
-    pub fn ticks(self, milliseconds: u32, parameter: &'static str) -> Result<u32, ControlError> {
+    pub fn ticks(self, milliseconds: u32, parameter: &'static str) -> Result<u32, ParameterError> {
         if milliseconds > LONGEST_MS {
-            return Err(ControlError {
+            return Err(ParameterError {
                 parameter,
                 joint: None,
                 reason: "has to be at most an hour (3600000)",

@@ -24,9 +24,9 @@
 //! In a tick, a fault that is there comes first, then the command, then the end of a release.
 
 use crate::command::{Answer, Command, Refusal};
-use crate::control::ControlError;
 use crate::fault::Raised;
 use crate::math::Real;
+use crate::parameter::ParameterError;
 use crate::period::Period;
 use serde::{Deserialize, Serialize};
 
@@ -122,7 +122,7 @@ impl SupervisorConfig {
     ///
     /// # Errors
     /// A time above an hour.
-    pub fn prepare<T: Real>(&self, period: Period) -> Result<Ramps<T>, ControlError> {
+    pub fn prepare<T: Real>(&self, period: Period) -> Result<Ramps<T>, ParameterError> {
         Ok(Ramps {
             soft_start: Ramp::new(period.ticks(self.soft_start_ms, "supervisor.soft_start_ms")?),
             release: Ramp::new(period.ticks(self.release_ms, "supervisor.release_ms")?),

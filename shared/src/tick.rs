@@ -14,12 +14,13 @@
 //! Torques are those of the tick's end: what is computed from the counts of this tick acts from the next.
 
 use crate::command::Command;
-use crate::control::{ControlError, GraspConfig, GraspLaw, Grip, Latch, Monitor};
+use crate::control::{GraspConfig, GraspLaw, Grip, Latch, Monitor};
 use crate::estimate::{Estimator, EstimatorConfig, Motion, Tracks};
 use crate::fault::{Fault, FaultConfig, Raised, Watch};
 use crate::hand::{Hand, Posture};
 use crate::limit::{LimitConfig, Limiting, Limits};
 use crate::math::Real;
+use crate::parameter::ParameterError;
 use crate::period::Period;
 use crate::supervisor::{Drive, Mode, Ramps, Supervisor, SupervisorConfig};
 use crate::telemetry::{List, Record};
@@ -60,7 +61,7 @@ impl<T: Real, const J: usize, const F: usize> Params<T, J, F> {
     ///
     /// # Errors
     /// The first parameter that is wrong, with its joint and the reason.
-    pub fn new(hand: Hand<T, J, F>, config: &Config<T, J>) -> Result<Self, ControlError> {
+    pub fn new(hand: Hand<T, J, F>, config: &Config<T, J>) -> Result<Self, ParameterError> {
         let period = Period::from_us(config.period_us)?;
         let estimator = config.estimator.prepare(hand.joint_count(), period)?;
         Ok(Self {

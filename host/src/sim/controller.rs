@@ -4,11 +4,12 @@ use crate::plant::dynamics::JointVector;
 use crate::scene::Scene;
 use crate::{MAX_FINGERS, MAX_JOINTS};
 use blindgrasp_shared::command::Command;
-use blindgrasp_shared::control::{ControlError, GraspConfig};
+use blindgrasp_shared::control::GraspConfig;
 use blindgrasp_shared::estimate::{Encoder, EstimatorConfig};
 use blindgrasp_shared::fault::FaultConfig;
 use blindgrasp_shared::limit::{LimitConfig, StopConfig};
 use blindgrasp_shared::math::Real;
+use blindgrasp_shared::parameter::ParameterError;
 use blindgrasp_shared::supervisor::SupervisorConfig;
 use blindgrasp_shared::tick::{Config, Output, Params, State, tick, tick_with};
 use nalgebra::Vector3;
@@ -42,7 +43,7 @@ pub(super) struct Controller {
 }
 
 impl Controller {
-    pub(super) fn new(scene: &Scene) -> Result<Self, ControlError> {
+    pub(super) fn new(scene: &Scene) -> Result<Self, ParameterError> {
         let config = config(scene);
         let mut counts_per_rad = [0.0; MAX_JOINTS];
         for (counts, joint) in counts_per_rad.iter_mut().zip(&scene.joints) {

@@ -21,7 +21,8 @@ use crate::plant::dynamics::JointVector;
 use crate::plant::{Lost, ModelError, Motion, ObjectModel, Plant, PlantModel};
 use crate::record::sample::Sample;
 use crate::scene::Scene;
-use blindgrasp_shared::control::{ControlError, GraspLaw};
+use blindgrasp_shared::control::GraspLaw;
+use blindgrasp_shared::parameter::ParameterError;
 use controller::{Controller, grasp_config};
 use nalgebra::Vector3;
 use observe::{Observer, Seen};
@@ -36,7 +37,7 @@ pub enum SimulationError {
     Model(#[from] ModelError),
     /// The controller refuses its parameters.
     #[error("control: {0}")]
-    Control(#[from] ControlError),
+    Control(#[from] ParameterError),
 }
 
 /// A finished run.
@@ -170,7 +171,7 @@ impl Simulation {
 ///
 /// # Errors
 /// A gain that is out of its range.
-pub fn law(scene: &Scene) -> Result<GraspLaw<f64, MAX_JOINTS>, ControlError> {
+pub fn law(scene: &Scene) -> Result<GraspLaw<f64, MAX_JOINTS>, ParameterError> {
     grasp_config(scene).prepare(&scene.hand)
 }
 

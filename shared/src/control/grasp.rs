@@ -22,7 +22,7 @@
 use crate::hand::frame::product_transposed;
 use crate::hand::{Hand, Posture, Wrench};
 use crate::math::Real;
-use core::fmt;
+use crate::parameter::ParameterError;
 use nalgebra::{Matrix3, Vector3};
 
 /// Gains of the grasp law, as a user gives them.
@@ -39,35 +39,13 @@ pub struct GraspConfig<T, const J: usize> {
     pub gravity_m_s2: Option<Vector3<T>>,
 }
 
-/// Why gains can't be used.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct ControlError {
-    /// The parameter.
-    pub parameter: &'static str,
-    /// The joint that it belongs to, if it belongs to one.
-    pub joint: Option<usize>,
-    /// What it has to be.
-    pub reason: &'static str,
-}
-
-impl fmt::Display for ControlError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self.joint {
-            Some(joint) => write!(f, "{} of joint {joint} {}", self.parameter, self.reason),
-            None => write!(f, "{} {}", self.parameter, self.reason),
-        }
-    }
-}
-
-impl core::error::Error for ControlError {}
-
 impl<T: Real, const J: usize> GraspConfig<T, J> {
     /// Checks the gains and prepares the law for a hand.
     ///
     /// # Errors
     /// The first gain that is not finite or negative.
-    pub fn prepare<const F: usize>(&self, hand: &Hand<T, J, F>) -> Result<GraspLaw<T, J>, ControlError> {
-        let fail = |parameter, joint, reason| Err(ControlError { parameter, joint, reason });
+    pub fn prepare<const F: usize>(&self, hand: &Hand<T, J, F>) -> Result<GraspLaw<T, J>, ParameterError> {
+        let fail = |parameter, joint, reason| Err(ParameterError { parameter, joint, reason });
         let positive_or_zero = |v: T| v >= T::zero() && v.is_finite();
         if !positive_or_zero(self.force_n) {
             return fail("force_n", None, "has to be zero or positive");

@@ -4,4 +4,4 @@
 
 pub mod grasp;
 
-pub use grasp::{ControlError, GraspConfig, GraspLaw, Grip, Latch, Monitor};
+pub use grasp::{GraspConfig, GraspLaw, Grip, Latch, Monitor};

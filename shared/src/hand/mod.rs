@@ -10,6 +10,7 @@
 //! Arrays have a capacity fixed at compile time (`J` joints, `F` fingertips) and a count known at run time: the firmware
 //! has exact sizes, the host can load any hand.
 
+mod check;
 pub(crate) mod frame;
 pub mod kinematics;
 pub mod model;
