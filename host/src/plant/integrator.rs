@@ -179,9 +179,9 @@ impl Plant {
         }
         let weight = self.model.object_gravity_m_s2 * object.mass_kg;
         push.object[..3].copy_from_slice(weight.as_slice());
-        let mut dampings = [0.0; MAX_FINGERS];
+        let mut scales = [0.0; MAX_FINGERS];
         for i in 0..self.contacts.len() {
-            dampings[i] = self.press(i, tau, &mut push);
+            scales[i] = self.press(i, tau, &mut push);
         }
         let mut velocities = self.before;
         let pivot = self.coupling.solve(&mut velocities, &push, tau);
@@ -193,7 +193,7 @@ impl Plant {
         }
         for (i, (force, contact)) in self.forces.iter_mut().zip(&self.contacts).enumerate() {
             let multiplier = |row| self.coupling.multiplier(i, row);
-            force.normal_n -= dampings[i] * multiplier(Rows::INDENTATION);
+            force.normal_n -= scales[i] * multiplier(Rows::INDENTATION);
             force.lambda_x_n = -multiplier(Rows::SLIP_X);
             force.lambda_z_n = -multiplier(Rows::SLIP_Z);
             force.torsion_nm = contact.torsion_nm_s.square_root() * multiplier(Rows::TORSION);

@@ -115,7 +115,7 @@ fn check_joint(joint: &JointFile, key: &dyn Fn(&str) -> String) -> Result<()> {
     within(&key("damping_gain_nm_s_rad"), joint.damping_gain_nm_s_rad, 0.0, 1e6)?;
     within(&key("torque_limit_nm"), joint.torque_limit_nm, 1e-9, 1e6)?;
     within(&key("speed_limit_rad_s"), joint.speed_limit_rad_s, 1e-6, 1e6)?;
-    within(&key("encoder_counts_per_turn"), joint.encoder_counts_per_turn, 1.0, 1e9)?;
+    within(&key("encoder_counts_per_turn"), joint.encoder_counts_per_turn, 8.0, 1e9)?;
     within(&key("viscous_friction_nm_s_rad"), joint.viscous_friction_nm_s_rad, 0.0, 1e6)?;
     within(&key("coulomb_friction_nm"), joint.coulomb_friction_nm, 0.0, 1e6)?;
     within(&key("presliding_rad"), joint.presliding_rad, 1e-9, 1.0)?;
