@@ -105,6 +105,16 @@ fn exit_code_says_whether_the_grasp_held() {
     assert!(text(&lost.stdout).contains("LOST") && text(&lost.stdout).contains("finger"));
 }
 
+/// A hand that lets go because of a fault says so, with the joint's name: not only that the object is gone.
+#[test]
+fn a_fault_of_the_controller_is_named() {
+    let slow = "hand.joint.finger-2-flex-1.speed_limit_rad_s=0.05";
+    let output = blindgrasp(&["sim", "cube", "--set", slow]);
+    assert_eq!(output.status.code(), Some(1), "{}", text(&output.stderr));
+    let table = text(&output.stdout);
+    assert!(table.contains("fault 5") && table.contains("finger-2-flex-1"), "{table}");
+}
+
 #[test]
 fn out_writes_every_file_and_the_scene_reproduces_the_run() {
     let folder = Folder::new("out");

@@ -110,6 +110,9 @@ fn describe(summary: &Summary) -> String {
             _ => "held".to_owned(),
         },
     );
+    if let Some(fault) = &summary.fault {
+        line("controller", fault.clone());
+    }
     line(
         "at rest",
         match summary.settle_time_s {

@@ -39,7 +39,7 @@ pub(super) struct Controller {
     counts_per_rad: JointVector,
     noise_counts: f64,
     noise: fastrand::Rng,
-    joints: usize,
+    joint_names: Vec<String>,
 }
 
 impl Controller {
@@ -59,7 +59,7 @@ impl Controller {
             counts_per_rad,
             noise_counts: scene.sensors.noise_counts,
             noise: fastrand::Rng::with_seed(u64::from(scene.seed)),
-            joints: scene.hand.joint_count(),
+            joint_names: scene.joints.iter().map(|joint| joint.name.clone()).collect(),
         })
     }
 
@@ -88,7 +88,7 @@ impl Controller {
 
     fn read_encoders(&mut self, angles_rad: &JointVector) -> [i32; MAX_JOINTS] {
         let mut counts = [0; MAX_JOINTS];
-        for k in 0..self.joints {
+        for k in 0..self.joint_names.len() {
             let noise = if self.noise_counts > 0.0 { self.noise_counts * self.normal() } else { 0.0 };
             counts[k] = (angles_rad[k] * self.counts_per_rad[k] + noise).round() as i32;
         }
@@ -125,7 +125,9 @@ impl Controller {
 
     /// The fault that the hand is in, in words.
     pub(super) fn fault(&self) -> Option<String> {
-        self.state.fault().map(|raised| raised.to_string())
+        let raised = self.state.fault()?;
+        let joint = self.joint_names.get(usize::from(raised.joint)).map_or("?", String::as_str);
+        Some(format!("fault {}: joint `{joint}`: {}", raised.fault.number(), raised.fault.words()))
     }
 }
 
