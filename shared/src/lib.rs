@@ -12,15 +12,21 @@
 #[cfg(test)]
 extern crate std;
 
+pub mod buffer;
 pub mod command;
 pub mod control;
+pub mod device;
 pub mod estimate;
+pub mod event;
 pub mod fault;
 pub mod hand;
+pub mod identity;
 pub mod limit;
+pub mod link;
 pub mod math;
 pub mod parameter;
 pub mod period;
+pub mod settings;
 pub mod supervisor;
 pub mod telemetry;
 pub mod tick;

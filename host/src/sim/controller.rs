@@ -3,15 +3,15 @@
 use crate::plant::dynamics::JointVector;
 use crate::scene::Scene;
 use crate::{MAX_FINGERS, MAX_JOINTS};
-use blindgrasp_shared::command::Command;
+use blindgrasp_shared::command::{Command, Grasp};
 use blindgrasp_shared::control::GraspConfig;
 use blindgrasp_shared::estimate::{Encoder, EstimatorConfig};
-use blindgrasp_shared::fault::FaultConfig;
+use blindgrasp_shared::fault::{FaultConfig, FrozenConfig};
 use blindgrasp_shared::limit::{LimitConfig, StopConfig};
 use blindgrasp_shared::math::Real;
 use blindgrasp_shared::parameter::ParameterError;
 use blindgrasp_shared::supervisor::SupervisorConfig;
-use blindgrasp_shared::tick::{Config, Output, Params, State, tick, tick_with};
+use blindgrasp_shared::tick::{Config, Input, Output, Params, State, tick};
 use nalgebra::Vector3;
 use std::f64::consts::TAU;
 
@@ -25,6 +25,17 @@ const RANGE_SLACK_RAD: f64 = 0.1;
 const IMPOSSIBLE_SPEED: f64 = 1.5;
 /// How long a torque may stay at its limit, ms.
 const SATURATED_MS: u32 = 1000;
+/// How many times as firmly as configured a user may grasp.
+const FIRMEST: f64 = 4.0;
+/// A counter that stands still is not believed for longer than this, ms, ...
+const FROZEN_MS: u32 = 50;
+/// ... once the torque changed by this share of its limit ...
+const FROZEN_SHARE: f64 = 0.02;
+/// ... and a neighbour turned by this, rad. In grasps of the prism and the cube, with up to three times the friction and
+/// twice the force, neighbours of joints that really stood still turned by 0.011 rad at most.
+const FROZEN_NEIGHBOUR_RAD: f64 = 0.03;
+/// The work of a second is at most that of all torque limits over this angle, rad.
+const ENERGY_TRAVEL_RAD: f64 = 0.1;
 /// How long letting go takes, ms.
 const RELEASE_MS: u32 = 300;
 
@@ -70,7 +81,7 @@ impl Controller {
 
     /// One tick; the first is told to grasp.
     pub(super) fn tick(&mut self, angles_rad: &JointVector, speeds_rad_s: &JointVector) {
-        let command = if self.started { None } else { Some(Command::Grasp) };
+        let command = if self.started { None } else { Some(Command::Grasp(Grasp::CONFIGURED)) };
         self.started = true;
         self.step(angles_rad, speeds_rad_s, command);
     }
@@ -78,10 +89,10 @@ impl Controller {
     fn step(&mut self, angles_rad: &JointVector, speeds_rad_s: &JointVector, command: Option<Command>) {
         let output = if self.ideal {
             let (angles, speeds) = (angles_rad.map(|v| v as f32), speeds_rad_s.map(|v| v as f32));
-            tick_with(&self.params, &mut self.state, &angles, &speeds, command)
+            tick(&self.params, &mut self.state, &Input::ideal(&angles, &speeds, command))
         } else {
             let counts = self.read_encoders(angles_rad);
-            tick(&self.params, &mut self.state, &counts, command)
+            tick(&self.params, &mut self.state, &Input::counts(&counts, command))
         };
         self.output = Some(output);
     }
@@ -126,8 +137,9 @@ impl Controller {
     /// The fault that the hand is in, in words.
     pub(super) fn fault(&self) -> Option<String> {
         let raised = self.state.fault()?;
-        let joint = self.joint_names.get(usize::from(raised.joint)).map_or("?", String::as_str);
-        Some(format!("fault {}: joint `{joint}`: {}", raised.fault.number(), raised.fault.words()))
+        let joint = raised.joint.and_then(|joint| self.joint_names.get(usize::from(joint)));
+        let joint = joint.map_or(String::new(), |name| format!("joint `{name}`: "));
+        Some(format!("fault {}: {joint}{}", raised.fault.number(), raised.fault.words()))
     }
 }
 
@@ -170,6 +182,11 @@ fn config(scene: &Scene) -> Config<f32, MAX_JOINTS> {
         },
         law: grasp_config(scene),
         limits: LimitConfig {
+            force_n: scene.actuators.torque_limits.then_some((FIRMEST * scene.control.force_n) as f32),
+            attitude_stiffness_nm: scene
+                .actuators
+                .torque_limits
+                .then_some((FIRMEST * scene.control.attitude_stiffness_nm) as f32),
             torque_nm: scene
                 .actuators
                 .torque_limits
@@ -183,6 +200,17 @@ fn config(scene: &Scene) -> Config<f32, MAX_JOINTS> {
             speed_limit_rad_s: watched.then(|| each(scene, 1.0, |k| scene.joints[k].speed_limit_rad_s)),
             range_slack_rad: scene.control.end_stops.then_some(RANGE_SLACK_RAD as f32),
             saturated_ms: scene.actuators.torque_limits.then_some(SATURATED_MS),
+            frozen: (watched && scene.actuators.torque_limits).then(|| FrozenConfig {
+                torque_nm: each(scene, 1.0, |k| FROZEN_SHARE * scene.joints[k].torque_limit_nm),
+                neighbour_rad: FROZEN_NEIGHBOUR_RAD as f32,
+                after_ms: FROZEN_MS,
+            }),
+            heartbeat_ms: None,
+            late_ticks: None,
+            energy_j: scene.actuators.torque_limits.then(|| {
+                let torques: f64 = scene.joints.iter().map(|joint| joint.torque_limit_nm).sum();
+                (ENERGY_TRAVEL_RAD * torques) as f32
+            }),
         },
         supervisor: SupervisorConfig {
             soft_start_ms: (scene.control.soft_start_s * 1e3).round() as u32,
