@@ -18,6 +18,7 @@ pub mod estimate;
 pub mod fault;
 pub mod hand;
 pub mod limit;
+pub mod link;
 pub mod math;
 pub mod parameter;
 pub mod period;

@@ -54,13 +54,13 @@ pub struct Record<T, const J: usize> {
     pub limiting: List<Limiting, J>,
 }
 
-/// The buffer is too small for the record.
+/// The buffer is too small for what is to be written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct BufferTooSmall;
 
 impl fmt::Display for BufferTooSmall {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "the buffer is too small for the record")
+        write!(f, "the buffer is too small for what is to be written")
     }
 }
 
