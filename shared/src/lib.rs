@@ -21,6 +21,7 @@ pub mod limit;
 pub mod math;
 pub mod parameter;
 pub mod period;
+pub mod plain;
 pub mod supervisor;
 pub mod telemetry;
 pub mod tick;

@@ -93,6 +93,10 @@ impl Document {
             }
         }
         for setting in settings.iter().filter(|setting| !is_reference(setting)) {
+            if let Some(key) = setting.key.strip_prefix("hand.control") {
+                let (problem, remedy) = ("acts in the firmware only", format!("set control{key}"));
+                return Err(SceneError::new(&setting.key, problem, remedy).at(&Place::whole("--set")));
+            }
             self.node.set(setting)?;
         }
         Ok(self.node)

@@ -1,18 +1,24 @@
 //! What a hand is: joints, links and fingertips, checked and prepared once.
 
 use super::check::{check_counts, check_fingertip, check_joint};
+use super::written::Read;
 use crate::math::{Real, norm};
+use crate::plain::Number;
 use core::fmt;
 use nalgebra::{Matrix3, Vector3};
+use serde::{Deserialize, Serialize};
 
 /// A rigid link, in its own frame.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(bound = "T: Number")]
 pub struct Link<T> {
     /// Mass, kg; zero for a link whose mass is counted in another.
     pub mass_kg: T,
     /// Centre of mass, m.
+    #[serde(with = "crate::plain")]
     pub mass_centre_m: Vector3<T>,
     /// Inertia tensor about the centre of mass, kg m^2; symmetric.
+    #[serde(with = "crate::plain")]
     pub inertia_kg_m2: Matrix3<T>,
 }
 
@@ -36,11 +42,13 @@ pub struct Joint<T> {
 }
 
 /// A hemispherical fingertip.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(bound = "T: Number")]
 pub struct Fingertip<T> {
     /// Index of the link that it is part of.
     pub link: usize,
     /// Centre of its sphere in the link frame, m.
+    #[serde(with = "crate::plain")]
     pub offset_m: Vector3<T>,
     /// Radius `r_i`, m.
     pub radius_m: T,
@@ -130,27 +138,33 @@ impl fmt::Display for HandError {
 impl core::error::Error for HandError {}
 
 /// A joint as the kinematics wants it: its link frame is chosen such that the joint turns about the local z axis.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(bound = "T: Number")]
 pub(super) struct PreparedJoint<T> {
     pub(super) parent: Option<usize>,
     /// Joint origin in the parent's prepared frame, m.
+    #[serde(with = "crate::plain")]
     pub(super) offset_m: Vector3<T>,
     /// Prepared frame at zero angle in the parent's prepared frame; `None` where the two axes are parallel, because the
     /// frame is then chosen to be the parent's, and forward kinematics saves a product.
+    #[serde(with = "crate::plain")]
     pub(super) attitude: Option<Matrix3<T>>,
     /// Prepared frame in the link frame of the description.
+    #[serde(with = "crate::plain")]
     pub(super) from_link: Matrix3<T>,
     pub(super) lower_rad: T,
     pub(super) upper_rad: T,
     pub(super) link: Link<T>,
     /// Mass of the link times its centre, kg m.
+    #[serde(with = "crate::plain")]
     pub(super) first_moment_kg_m: Vector3<T>,
     /// Mass of everything that the joint carries, kg.
     pub(super) carried_kg: T,
 }
 
 /// A hand, checked and prepared: at most `J` joints and `F` fingertips.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(try_from = "Read<T, J, F>", bound = "T: Number")]
 pub struct Hand<T, const J: usize, const F: usize> {
     pub(super) joint_count: usize,
     pub(super) fingertip_count: usize,
@@ -282,6 +296,13 @@ impl<T: Real, const J: usize, const F: usize> Hand<T, J, F> {
     }
 }
 
+/// A joint that is not there.
+impl<T: Real> Default for PreparedJoint<T> {
+    fn default() -> Self {
+        Self::still()
+    }
+}
+
 impl<T: Real> PreparedJoint<T> {
     /// A joint that is not there: fills the unused capacity.
     fn still() -> Self {
@@ -343,6 +364,13 @@ impl<T: Real> PreparedJoint<T> {
             first_moment_kg_m: cast(&self.first_moment_kg_m),
             carried_kg: U::from_f64(self.carried_kg.to_f64()),
         }
+    }
+}
+
+/// A fingertip that is not there.
+impl<T: Real> Default for Fingertip<T> {
+    fn default() -> Self {
+        no_fingertip()
     }
 }
 
