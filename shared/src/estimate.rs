@@ -44,11 +44,9 @@
 use crate::math::Real;
 use crate::parameter::ParameterError;
 use crate::period::Period;
-use crate::plain::{Number, Value};
-use serde::{Deserialize, Serialize};
 
 /// How the counts of one joint are read.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Encoder<T> {
     /// The count at joint angle zero.
     pub zero_count: i32,
@@ -58,20 +56,12 @@ pub struct Encoder<T> {
     pub reversed: bool,
 }
 
-impl<T: Number> Value for Encoder<T> {
-    fn is_blank(&self) -> bool {
-        self.zero_count == 0 && self.rad_per_count.is_blank() && !self.reversed
-    }
-}
-
 /// Encoders and filter, as a user gives them.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(bound = "T: Number")]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct EstimatorConfig<T, const J: usize> {
     /// Bandwidth `f` of the filter, Hz: a speed that swings at this frequency is reported at about half its size. 100 Hz suits 0.0167 degree counts.
     pub bandwidth_hz: T,
     /// One a joint.
-    #[serde(with = "crate::plain")]
     pub encoders: [Encoder<T>; J],
 }
 

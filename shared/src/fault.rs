@@ -12,7 +12,6 @@ use crate::limit::{Limit, Limiting};
 use crate::math::Real;
 use crate::parameter::ParameterError;
 use crate::period::Period;
-use crate::plain::Number;
 use core::fmt;
 use serde::{Deserialize, Serialize};
 
@@ -113,15 +112,12 @@ impl fmt::Display for Raised {
 }
 
 /// Where faults begin, as a user says; `None` leaves one out.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(bound = "T: Number")]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FaultConfig<T, const J: usize> {
     /// Speed that each joint can't reach, rad/s: a count that changes faster is wrong. The motor's no-load speed over
     /// the gear, with room.
-    #[serde(with = "crate::plain")]
     pub possible_speed_rad_s: Option<[T; J]>,
     /// Speed that each joint must not reach, rad/s. Not the difference of two counts but the filtered speed is meant.
-    #[serde(with = "crate::plain")]
     pub speed_limit_rad_s: Option<[T; J]>,
     /// How far a joint may be beyond its range, rad.
     pub range_slack_rad: Option<T>,

@@ -12,16 +12,17 @@
 #[cfg(test)]
 extern crate std;
 
+pub mod buffer;
 pub mod command;
 pub mod control;
 pub mod estimate;
 pub mod fault;
 pub mod hand;
+pub mod identity;
 pub mod limit;
 pub mod math;
 pub mod parameter;
 pub mod period;
-pub mod plain;
 pub mod supervisor;
 pub mod telemetry;
 pub mod tick;

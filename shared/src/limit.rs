@@ -14,7 +14,6 @@ use crate::hand::Hand;
 use crate::math::Real;
 use crate::parameter::ParameterError;
 use crate::period::Period;
-use crate::plain::Number;
 use core::fmt;
 use serde::{Deserialize, Serialize};
 
@@ -94,14 +93,11 @@ impl fmt::Display for Limiting {
 }
 
 /// Limits, as a user gives them; `None` leaves one out.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(bound = "T: Number")]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LimitConfig<T, const J: usize> {
     /// Largest torque of each joint, N m.
-    #[serde(with = "crate::plain")]
     pub torque_nm: Option<[T; J]>,
     /// Largest change of each joint's torque, N m/s.
-    #[serde(with = "crate::plain")]
     pub slew_nm_s: Option<[T; J]>,
     /// Soft end stops.
     pub stops: Option<StopConfig<T, J>>,
@@ -113,17 +109,13 @@ impl<T: Real, const J: usize> LimitConfig<T, J> {
 }
 
 /// Soft end stops, as a user gives them.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(bound = "T: Number")]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StopConfig<T, const J: usize> {
     /// How far before the end of the joint's range the stop begins to act, rad; at most half the range.
-    #[serde(with = "crate::plain")]
     pub margin_rad: [T; J],
     /// Torque that pushes back, by depth into the margin, N m/rad.
-    #[serde(with = "crate::plain")]
     pub stiffness_nm_rad: [T; J],
     /// Torque that brakes motion towards the end, once the margin is used up, N m s/rad.
-    #[serde(with = "crate::plain")]
     pub damping_nm_s: [T; J],
 }
 

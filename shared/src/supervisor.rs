@@ -109,7 +109,7 @@ pub fn outcome(mode: Mode, event: Event) -> Outcome {
 }
 
 /// Times, as a user gives them.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct SupervisorConfig {
     /// Time over which the force grows, ms.
     pub soft_start_ms: u32,

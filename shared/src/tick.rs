@@ -22,18 +22,11 @@ use crate::limit::{LimitConfig, Limiting, Limits};
 use crate::math::Real;
 use crate::parameter::ParameterError;
 use crate::period::Period;
-use crate::plain::Number;
 use crate::supervisor::{Drive, Mode, Ramps, Supervisor, SupervisorConfig};
 use crate::telemetry::{List, Record};
-use serde::{Deserialize, Serialize};
-
-mod model;
-
-pub use model::{Model, ModelError};
 
 /// Everything that can be set, in SI units.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(bound = "T: Number")]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Config<T, const J: usize> {
     /// Time from one tick to the next, us.
     pub period_us: u32,

@@ -9,9 +9,10 @@ use super::{
     hand::hand,
     library::{Document, Kind, complete_hand},
     read::read,
+    source::{IMPORTS, Source},
 };
-use crate::{Hand, MAX_FINGERS, MAX_JOINTS};
-use blindgrasp_shared::tick::{Config, Model, Params};
+use crate::{Hand, MAX_JOINTS};
+use blindgrasp_shared::tick::{Config, Params};
 use std::path::Path;
 
 /// A hand, checked, with the configuration that its file asks for: encoders, torque limits, soft end stops as in
@@ -38,9 +39,8 @@ impl HandModel {
     /// One line: where, which key, what is wrong, what to do.
     pub fn load(name_or_path: &str) -> std::result::Result<Self, SceneError> {
         let whole = Place::whole(name_or_path);
-        let mut tree = Document::open(Kind::Hand, name_or_path, Path::new(""))
-            .map_err(|error| error.at(&whole))?
-            .node;
+        let mut tree =
+            Document::open(Kind::Hand, name_or_path, Path::new("")).map_err(|error| error.at(&whole))?.node;
         complete_hand(&mut tree);
         let file = read(&tree, "")?;
         Self::build(&file).map_err(|mut error| {
@@ -88,15 +88,31 @@ impl HandModel {
         Ok(Self { name: file.name.clone(), hand, joint_names, config, warnings })
     }
 
-    /// What the firmware is built with, as [`Model::decode`] reads it.
-    pub fn encode(&self) -> Vec<u8> {
-        let model: Model<MAX_JOINTS, MAX_FINGERS> = Model { hand: self.hand.cast(), config: self.config };
-        let mut buffer = vec![0; 1024];
-        loop {
-            match model.encode(&mut buffer) {
-                Ok(bytes) => return bytes.to_vec(),
-                Err(_) => buffer.resize(2 * buffer.len(), 0),
-            }
-        }
+    /// What the firmware is built with, as Rust source: the constants `JOINTS`, `FINGERS`, `HAND` and `CONFIG`. The same hand
+    /// gives the same text, wherever its file lies.
+    pub fn source(&self) -> String {
+        let hand = self.hand.cast::<f32>();
+        let (joints, fingertips) = (hand.prepared_joints(), hand.prepared_fingertips());
+        let count = joints.len();
+        format!(
+            "{IMPORTS}
+/// Joints of the hand.
+pub const JOINTS: usize = {count};
+/// Fingertips of the hand.
+pub const FINGERS: usize = {};
+/// The hand `{}`, prepared.
+pub static HAND: Hand<f32, JOINTS, FINGERS> = match Hand::from_prepared({}, {}) {{
+    Ok(hand) => hand,
+    Err(_) => panic!(\"the joints are no tree\"),
+}};
+/// Its gains, limits and times.
+pub static CONFIG: Config<f32, JOINTS> = {};
+",
+            fingertips.len(),
+            self.name,
+            joints.source(count),
+            fingertips.source(count),
+            self.config.source(count),
+        )
     }
 }

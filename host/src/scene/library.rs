@@ -35,9 +35,11 @@ impl Kind {
     /// Names and texts.
     pub(super) fn built_in(self) -> &'static [(&'static str, &'static str)] {
         match self {
-            Self::Scene => built_in!("scenes": "prism" "cube" "prism-ideal" "cube-ideal" "cube-normal-only"),
-            Self::Hand => built_in!("hands": "three-finger"),
-            Self::Object => built_in!("objects": "prism" "cube"),
+            Self::Scene => {
+                built_in!("scenes": "prism" "cube" "prism-ideal" "cube-ideal" "cube-normal-only" "two-finger-prism")
+            }
+            Self::Hand => built_in!("hands": "three-finger" "two-finger"),
+            Self::Object => built_in!("objects": "prism" "cube" "hexagonal-prism"),
         }
     }
 }

@@ -23,13 +23,10 @@ use crate::hand::frame::product_transposed;
 use crate::hand::{Hand, Posture, Wrench};
 use crate::math::Real;
 use crate::parameter::ParameterError;
-use crate::plain::Number;
 use nalgebra::{Matrix3, Vector3};
-use serde::{Deserialize, Serialize};
 
 /// Gains of the grasp law, as a user gives them.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(bound = "T: Number")]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct GraspConfig<T, const J: usize> {
     /// Nominal grasping force `f_d`, N. The force of a fingertip is not this but Eq. 57, and grows with the object's
     /// size.
@@ -37,10 +34,8 @@ pub struct GraspConfig<T, const J: usize> {
     /// Stiffness `K_st` of the relative attitudes, N m; zero grasps by normal forces alone.
     pub attitude_stiffness_nm: T,
     /// Damping `C` of each joint, N m s/rad.
-    #[serde(with = "crate::plain")]
     pub damping_nm_s: [T; J],
     /// Gravity in the base frame, m/s^2; `None` leaves the weight of the links uncompensated.
-    #[serde(with = "crate::plain")]
     pub gravity_m_s2: Option<Vector3<T>>,
 }
 

@@ -14,7 +14,6 @@ mod check;
 pub(crate) mod frame;
 pub mod kinematics;
 pub mod model;
-mod written;
 
 pub use kinematics::{LinkPose, Posture, Wrench};
-pub use model::{Fingertip, Hand, HandError, Joint, Link};
+pub use model::{Fingertip, Hand, HandError, Joint, Link, PreparedJoint};

@@ -29,13 +29,6 @@ impl<T, const N: usize> List<T, N> {
     }
 }
 
-impl<T: Copy + Default, const N: usize> List<T, N> {
-    /// An array that begins with the items.
-    pub fn filled(&self) -> [T; N] {
-        core::array::from_fn(|k| self.as_slice().get(k).copied().unwrap_or_default())
-    }
-}
-
 impl<T: Default, const N: usize> Default for List<T, N> {
     fn default() -> Self {
         Self { items: core::array::from_fn(|_| T::default()), count: 0 }
