@@ -1,9 +1,4 @@
-//! Probe of size: what it takes to have the parameters of a hand.
+//! The hand that this firmware is for.
 #![no_std]
 
-include!(concat!(env!("OUT_DIR"), "/hand.rs"));
-
-/// Whether the image's descriptions are there.
-pub fn images() -> (&'static [u8], &'static [u8]) {
-    (&IMAGE_HAND, &IMAGE_PIL)
-}
+pub mod model;

@@ -4,14 +4,14 @@ use blindgrasp::plant::{Motion, Plant};
 use blindgrasp::scene::Scene;
 use blindgrasp::sim::{self, Simulation};
 use blindgrasp::{MAX_JOINTS, Posture};
-use blindgrasp_shared::command::Command;
-use blindgrasp_shared::control::{GraspConfig, Grip, Latch};
+use blindgrasp_shared::command::{Command, Grasp};
+use blindgrasp_shared::control::{GraspConfig, Latch};
 use blindgrasp_shared::estimate::{Encoder, EstimatorConfig};
 use blindgrasp_shared::fault::FaultConfig;
 use blindgrasp_shared::hand::{Hand, Posture as PostureOf};
 use blindgrasp_shared::limit::LimitConfig;
 use blindgrasp_shared::supervisor::SupervisorConfig;
-use blindgrasp_shared::tick::{Config, Params, State, tick};
+use blindgrasp_shared::tick::{Config, Input, Params, State, tick};
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use nalgebra::Vector3;
 use std::f64::consts::TAU;
@@ -54,7 +54,7 @@ fn controller(criterion: &mut Criterion) {
         bencher.iter(|| hand.forward_kinematics(black_box(&angles), &mut posture));
     });
     criterion.bench_function("law with gravity (f32, 12 joints)", |bencher| {
-        let grip = Grip { latch: &latch, force_share: 1.0, attitude_share: 1.0 };
+        let grip = law.grip(&latch);
         bencher.iter(|| law.torques(&hand, black_box(&posture), black_box(&speeds), Some(grip)));
     });
 
@@ -64,21 +64,25 @@ fn controller(criterion: &mut Criterion) {
         period_us: 1000,
         estimator: EstimatorConfig { bandwidth_hz: 50.0, encoders: [encoder; J] },
         law: gains,
-        limits: LimitConfig { torque_nm: Some([1.3878; J]), slew_nm_s: Some([1000.0; J]), stops: None },
+        limits: LimitConfig {
+            torque_nm: Some([1.3878; J]),
+            slew_nm_s: Some([1000.0; J]),
+            ..LimitConfig::NONE
+        },
         faults: FaultConfig { possible_speed_rad_s: Some([200.0; J]), ..FaultConfig::LEAST },
         supervisor: SupervisorConfig { soft_start_ms: 0, release_ms: 300 },
     };
     let params = Params::new(hand, &config).expect("parameters");
     let mut state = State::new();
     let counts = angles.map(|angle| (f64::from(angle) * per_turn / TAU) as i32);
-    for command in [Command::Arm, Command::Grasp] {
-        tick(&params, &mut state, &counts, Some(command));
+    for command in [Command::Arm, Command::Grasp(Grasp::CONFIGURED)] {
+        tick(&params, &mut state, &Input::counts(&counts, Some(command)));
     }
     criterion.bench_function("tick (f32, 12 joints)", |bencher| {
-        bencher.iter(|| tick(&params, &mut state, black_box(&counts), None));
+        bencher.iter(|| tick(&params, &mut state, &Input::counts(black_box(&counts), None)));
     });
     let mut buffer = [0; 512];
-    let record = tick(&params, &mut state, &counts, None).record;
+    let record = tick(&params, &mut state, &Input::counts(&counts, None)).record;
     criterion.bench_function("encode a record (12 joints)", |bencher| {
         bencher.iter(|| black_box(&record).encode(&mut buffer).map(|bytes| bytes.len()));
     });
@@ -94,7 +98,7 @@ fn plant(criterion: &mut Criterion) {
     let mut posture = Posture::at_base();
     scene.hand.forward_kinematics(&angles, &mut posture);
     let latch = Latch::of(&posture);
-    let grip = Grip { latch: &latch, force_share: 1.0, attitude_share: 1.0 };
+    let grip = law.grip(&latch);
     let (torques, _) = law.torques(&scene.hand, &posture, &[0.0; MAX_JOINTS], Some(grip));
     let mut plant = begin();
     let mut steps = 0;

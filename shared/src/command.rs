@@ -7,14 +7,14 @@ use core::fmt;
 use serde::{Deserialize, Serialize};
 
 /// A command.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Command {
     /// Let the joints have torque: hold their weight and damp them.
     Arm,
     /// Take the torque away.
     Disarm,
     /// Close the hand, and hold what is in it.
-    Grasp,
+    Grasp(Grasp),
     /// Let go slowly.
     Release,
     /// Take the torque away at once, in every mode.
@@ -23,17 +23,40 @@ pub enum Command {
     ClearFault,
 }
 
+/// How firmly to grasp; what is left out is as configured.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Grasp {
+    /// Nominal grasping force `f_d`, N.
+    pub force_n: Option<f32>,
+    /// Stiffness `K_st` of the relative attitudes, N m.
+    pub attitude_stiffness_nm: Option<f32>,
+}
+
+impl Grasp {
+    /// As configured.
+    pub const CONFIGURED: Self = Self { force_n: None, attitude_stiffness_nm: None };
+}
+
 impl Command {
+    /// Bytes that suffice for every command.
+    pub const MOST_BYTES: usize = 1 + 2 * (1 + 4);
+
     /// Every command.
-    pub const ALL: [Self; 6] =
-        [Self::Arm, Self::Disarm, Self::Grasp, Self::Release, Self::Stop, Self::ClearFault];
+    pub const ALL: [Self; 6] = [
+        Self::Arm,
+        Self::Disarm,
+        Self::Grasp(Grasp::CONFIGURED),
+        Self::Release,
+        Self::Stop,
+        Self::ClearFault,
+    ];
 
     /// Its name in words.
     pub const fn words(self) -> &'static str {
         match self {
             Self::Arm => "arm",
             Self::Disarm => "disarm",
-            Self::Grasp => "grasp",
+            Self::Grasp(_) => "grasp",
             Self::Release => "release",
             Self::Stop => "stop",
             Self::ClearFault => "clear fault",
@@ -41,53 +64,53 @@ impl Command {
     }
 }
 
-/// Why a command was refused.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub enum Refusal {
-    /// The hand is disarmed.
-    NotArmed,
-    /// There is no grasp to release.
-    NotGrasping,
-    /// A grasp is under way.
-    Grasping,
-    /// A release is under way.
-    Releasing,
-    /// The hand is in a fault.
-    InFault,
-    /// There is no fault to clear.
-    NoFault,
-    /// The cause of a fault is still there.
-    FaultPersists,
+/// Writes the enum and its tables from one line a refusal.
+macro_rules! refusals {
+    ($($name:ident = $words:literal;)*) => {
+        /// Why a request was refused.
+        #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+        pub enum Refusal {
+            $(#[doc = concat!("\"", $words, "\"")] $name,)*
+        }
+
+        impl Refusal {
+            /// Every refusal, in the order of their bytes on the wire.
+            pub const ALL: &[Self] = &[$(Self::$name),*];
+
+            /// The reason, and what to do.
+            pub const fn words(self) -> &'static str {
+                match self { $(Self::$name => $words,)* }
+            }
+        }
+    };
 }
 
-impl Refusal {
-    /// Every refusal.
-    pub const ALL: [Self; 7] = [
-        Self::NotArmed,
-        Self::NotGrasping,
-        Self::Grasping,
-        Self::Releasing,
-        Self::InFault,
-        Self::NoFault,
-        Self::FaultPersists,
-    ];
-
-    /// The reason, and what to do.
-    pub const fn words(self) -> &'static str {
-        match self {
-            Self::NotArmed => "the hand is disarmed: arm it first",
-            Self::NotGrasping => "there is no grasp to release",
-            Self::Grasping => "a grasp is under way: release it first, or stop",
-            Self::Releasing => "a release is under way: wait for its end, or stop",
-            Self::InFault => "the hand is in a fault: clear it first",
-            Self::NoFault => "there is no fault to clear",
-            Self::FaultPersists => "the cause of the fault is still there: remove it first",
-        }
-    }
+#[rustfmt::skip]
+refusals! {
+    NotArmed           = "the hand is disarmed: arm it first";
+    NotGrasping        = "there is no grasp to release";
+    Grasping           = "a grasp is under way: release it first, or stop";
+    Releasing          = "a release is under way: wait for its end, or stop";
+    InFault            = "the hand is in a fault: clear it first";
+    NoFault            = "there is no fault to clear";
+    FaultPersists      = "the cause of the fault is still there: remove it first";
+    NoHeartbeat        = "there is no heartbeat: send it all the time while the hand is armed";
+    FallbackClock      = "the crystal did not start, so that the tick has no exact time: repair the board";
+    NotFinite          = "a value is not a finite number";
+    OutOfRange         = "a value is out of its range: the limits are parameters";
+    NotDisarmed        = "parameters are set while the hand is disarmed: disarm it first";
+    NoSuchParameter    = "this hand has no parameter with this index";
+    SwitchedOff        = "this limit is switched off in the hand's configuration";
+    NoSession          = "there is no session of this number: say hello first";
+    OutOfOrder         = "this request, or a later one, was taken before: number them upwards";
+    OtherInterface     = "this firmware has another interface version: use the tool that belongs to it";
+    NotUnderstood      = "this is no request of this interface version";
+    Busy               = "too many requests are waiting: wait for the answers";
+    JointsAreReal      = "this image has real joints: only the image `pil` takes them over the link";
 }
 
 /// What became of a command.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Answer {
     /// The command.
     pub command: Command,
@@ -113,7 +136,7 @@ mod tests {
     fn answers_say_what_became_of_the_command() {
         let done = Answer { command: Command::Arm, refused: None };
         assert_eq!(done.to_string(), "arm: done");
-        let refused = Answer { command: Command::Grasp, refused: Some(Refusal::NotArmed) };
+        let refused = Answer { command: Command::Grasp(Grasp::CONFIGURED), refused: Some(Refusal::NotArmed) };
         assert_eq!(refused.to_string(), "grasp: refused, the hand is disarmed: arm it first");
     }
 }

@@ -1,10 +1,10 @@
 //! What can be wrong: numbered faults, and the watch that finds them.
 //!
-//! A fault takes all torque away in the tick that finds it, and is kept until it is cleared; the one that came first
-//! is the one that is reported. A fault's number never changes and is never used again for another.
+//! A fault takes all torque away in the tick that finds it; only the loss of the link lets the object go slowly first.
+//! It is kept until it is cleared; the one that came first is the one that is reported. A fault's number never changes
+//! and is never used again for another.
 //!
-//! Here are the faults that the tick can see by itself. Limits ([`limit`](crate::limit)) are no faults; a joint whose
-//! torque stays at its limit for long is one.
+//! Limits ([`limit`](crate::limit)) are no faults; a joint whose torque stays at its limit for long is one.
 
 use crate::estimate::{Estimator, Motion};
 use crate::hand::Hand;
@@ -17,13 +17,13 @@ use serde::{Deserialize, Serialize};
 
 /// Writes the enum and its tables from one line a fault.
 macro_rules! faults {
-    ($($name:ident = $number:literal, $words:literal, $remedy:literal;)*) => {
+    ($($name:ident = $number:literal, $reaction:ident, $words:literal, $found:literal, $remedy:literal;)*) => {
         /// A fault. On the wire it is its number.
         #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
         #[serde(into = "u8", try_from = "u8")]
         #[repr(u8)]
         pub enum Fault {
-            $(#[doc = concat!("A joint's ", $words, ".")] $name = $number,)*
+            $(#[doc = concat!("\"", $words, "\"")] $name = $number,)*
         }
 
         impl Fault {
@@ -35,9 +35,19 @@ macro_rules! faults {
                 self as u8
             }
 
-            /// What is wrong with the joint, in words.
+            /// What is done about it at once.
+            pub const fn reaction(self) -> Reaction {
+                match self { $(Self::$name => Reaction::$reaction,)* }
+            }
+
+            /// What is wrong, in words.
             pub const fn words(self) -> &'static str {
                 match self { $(Self::$name => $words,)* }
+            }
+
+            /// How it is found, and how soon.
+            pub const fn found(self) -> &'static str {
+                match self { $(Self::$name => $found,)* }
             }
 
             /// What to do.
@@ -53,14 +63,53 @@ macro_rules! faults {
     };
 }
 
+/// What is done about a fault in the tick that finds it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Reaction {
+    /// The torque is taken away.
+    TorqueOff,
+    /// The object is let go over the release time; then the torque is taken away.
+    Release,
+}
+
 #[rustfmt::skip]
 faults! {
-    SampleMissing    = 1, "encoder gave no sample",                                   "check the encoder's wiring and supply";
-    NotFinite        = 2, "angle, speed or torque is not a finite number",            "check the gains and the hand's file; report the record";
-    CountJump        = 3, "count changed by more than the joint can turn in a tick",  "check the encoder's wiring and screening; set the zero again";
-    BeyondRange      = 4, "angle is beyond its range",                                "move the joint back into its range; check its zero";
-    Overspeed        = 5, "speed is above its limit",                                 "check what drives the joint; lower the force or raise the damping";
-    SaturatedTooLong = 6, "torque stayed at its limit for too long",                  "look for a jam; lower the force";
+    SampleMissing    =  1, TorqueOff, "encoder gave no sample",
+        "in the tick whose reading failed",
+        "check the encoder's wiring and supply";
+    NotFinite        =  2, TorqueOff, "angle, speed or torque is not a finite number",
+        "in the tick that computes it",
+        "check the gains and the hand's file; report the record";
+    CountJump        =  3, TorqueOff, "count changed by more than the joint can turn in a tick",
+        "in the tick that reads it: a change above `faults.possible_speed_rad_s`",
+        "check the encoder's wiring and screening; set the zero again";
+    BeyondRange      =  4, TorqueOff, "angle is beyond its range",
+        "in the tick that reads it: more than `faults.range_slack_rad` beyond an end stop",
+        "move the joint back into its range; check its zero";
+    Overspeed        =  5, TorqueOff, "speed is above its limit",
+        "as soon as the estimated speed is above `faults.speed_limit_rad_s`; the estimate is late by the estimator's delay",
+        "check what drives the joint; lower the force or raise the damping";
+    SaturatedTooLong =  6, TorqueOff, "torque stayed at its limit for too long",
+        "after `faults.saturated_ms` without a break",
+        "look for a jam; lower the force";
+    CounterFrozen    =  7, TorqueOff, "count stands still although torque and neighbours changed",
+        "while grasping, after `faults.frozen_ms` without a count, once both the torque has changed by `faults.frozen_torque_nm` and a neighbouring joint has turned by `faults.frozen_neighbour_rad` since; while nothing moves a frozen counter is right, and not found",
+        "check the encoder and its coupling; look for a jam";
+    CounterReset     =  8, TorqueOff, "encoder lost its settings",
+        "one joint's settings are read back a tick: within as many ticks as there are joints",
+        "check the encoder's supply; set the zero again";
+    OutputFailed     =  9, TorqueOff, "amplifier's output does not answer",
+        "by read-back, one tick after the writing; at the start by a self-test",
+        "check the wiring and the supply of the outputs; the motor may have torque: switch its power off";
+    LinkLost         = 10, Release,   "heartbeat of the host stopped",
+        "after `faults.heartbeat_ms` without one",
+        "check the cable and the host's program";
+    TickLate         = 11, TorqueOff, "tick was late too often",
+        "a late tick counts 10, each one in time takes 1 off again: above 10 times `faults.late_ticks`",
+        "report the record; choose a longer period";
+    TooMuchEnergy    = 12, TorqueOff, "joints put more energy into the world than they may",
+        "as soon as the work of the last second (fading) is above `faults.energy_j`",
+        "check the signs of encoders and motors; look for what drives the hand";
 }
 
 impl From<Fault> for u8 {
@@ -94,20 +143,29 @@ impl TryFrom<u8> for Fault {
 pub struct Raised {
     /// The fault.
     pub fault: Fault,
-    /// The joint.
-    pub joint: u8,
+    /// The joint; `None` for what concerns the whole hand.
+    pub joint: Option<u8>,
 }
 
 impl Raised {
     /// A fault of a joint.
     pub fn at(joint: usize, fault: Fault) -> Self {
-        Self { fault, joint: u8::try_from(joint).unwrap_or(u8::MAX) }
+        Self { fault, joint: Some(u8::try_from(joint).unwrap_or(u8::MAX)) }
+    }
+
+    /// A fault of the whole hand.
+    pub const fn of_hand(fault: Fault) -> Self {
+        Self { fault, joint: None }
     }
 }
 
 impl fmt::Display for Raised {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "fault {}: joint {}: {}", self.fault.number(), self.joint, self.fault.words())
+        write!(f, "fault {}: ", self.fault.number())?;
+        if let Some(joint) = self.joint {
+            write!(f, "joint {joint}: ")?;
+        }
+        write!(f, "{}", self.fault.words())
     }
 }
 
@@ -123,6 +181,28 @@ pub struct FaultConfig<T, const J: usize> {
     pub range_slack_rad: Option<T>,
     /// How long a torque may stay at its limit, ms.
     pub saturated_ms: Option<u32>,
+    /// When a counter that stands still is not believed.
+    pub frozen: Option<FrozenConfig<T, J>>,
+    /// How long the host's heartbeat may fail while the hand has torque, ms.
+    pub heartbeat_ms: Option<u32>,
+    /// How many ticks in a row may be late; on average one in ten.
+    pub late_ticks: Option<u32>,
+    /// Work that the joints may do in a second (fading: of what was done a second ago, 1/e counts), J.
+    pub energy_j: Option<T>,
+}
+
+/// When a counter that stands still is not believed. A joint may stand still for hours; and in a grasp, a closed chain
+/// of rolling contacts, most of its torque limit may come and go without a count. What does not happen is that its
+/// neighbours turn far, and its torque changes, and it does not move at all.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FrozenConfig<T, const J: usize> {
+    /// Change of the torque since the last count that is too much for a joint that stands still, N m: well above its
+    /// friction.
+    pub torque_nm: [T; J],
+    /// Turn of the joint before or after it since then, rad.
+    pub neighbour_rad: T,
+    /// Shortest standstill that counts, ms.
+    pub after_ms: u32,
 }
 
 impl<T: Real, const J: usize> FaultConfig<T, J> {
@@ -132,6 +212,10 @@ impl<T: Real, const J: usize> FaultConfig<T, J> {
         speed_limit_rad_s: None,
         range_slack_rad: None,
         saturated_ms: None,
+        frozen: None,
+        heartbeat_ms: None,
+        late_ticks: None,
+        energy_j: None,
     };
 
     /// Checks the parameters and prepares the watch for a hand.
@@ -145,7 +229,11 @@ impl<T: Real, const J: usize> FaultConfig<T, J> {
         period: Period,
     ) -> Result<Watch<T, J>, ParameterError> {
         let joint_count = hand.joint_count().min(J);
-        let mut joints = [JointWatch { change: None, speed_rad_s: None, range_rad: None }; J];
+        let mut joints = [JointWatch::OFF; J];
+        if self.frozen.is_some_and(|f| !(f.neighbour_rad > T::zero() && f.neighbour_rad.is_finite())) {
+            let reason = "has to be positive";
+            return Err(ParameterError { parameter: "faults.frozen_neighbour_rad", joint: None, reason });
+        }
         if self.range_slack_rad.is_some_and(|slack| !(slack >= T::zero() && slack.is_finite())) {
             let reason = "has to be zero or positive";
             return Err(ParameterError { parameter: "faults.range_slack_rad", joint: None, reason });
@@ -167,18 +255,50 @@ impl<T: Real, const J: usize> FaultConfig<T, J> {
             if let Some(speeds) = self.speed_limit_rad_s {
                 joint.speed_rad_s = Some(positive("faults.speed_limit_rad_s", speeds[k])?);
             }
+            if let Some(frozen) = &self.frozen {
+                joint.frozen_nm = Some(positive("faults.frozen_torque_nm", frozen.torque_nm[k])?);
+            }
             if let Some(slack) = self.range_slack_rad {
                 let (lower, upper) = hand.range_rad(k);
                 joint.range_rad = Some((lower - slack, upper + slack));
             }
         }
-        let saturated_ticks = match self.saturated_ms {
-            Some(time) => Some(period.ticks(time, "faults.saturated_ms")?),
-            None => None,
+        if self.energy_j.is_some_and(|energy| !(energy > T::zero() && energy.is_finite())) {
+            let reason = "has to be positive";
+            return Err(ParameterError { parameter: "faults.energy_j", joint: None, reason });
+        }
+        if self.late_ticks.is_some_and(|ticks| ticks > LATE_TICKS_MOST) {
+            let reason = "has to be at most 1000";
+            return Err(ParameterError { parameter: "faults.late_ticks", joint: None, reason });
+        }
+        for k in 0..joint_count {
+            if let Some(parent) = hand.parent(k) {
+                joints[k].before = Some(parent);
+                joints[parent].after = Some(k);
+            }
+        }
+        let ticks = |time: Option<u32>, parameter| match time {
+            Some(time) => period.ticks(time, parameter).map(Some),
+            None => Ok(None),
         };
-        Ok(Watch { joint_count, joints, saturated_ticks })
+        Ok(Watch {
+            joint_count,
+            joints,
+            saturated_ticks: ticks(self.saturated_ms, "faults.saturated_ms")?,
+            frozen_ticks: ticks(self.frozen.map(|frozen| frozen.after_ms), "faults.frozen_ms")?,
+            heartbeat_ticks: ticks(self.heartbeat_ms, "faults.heartbeat_ms")?,
+            late_most: self.late_ticks.map(|ticks| ticks * LATE_WEIGHT),
+            neighbour_rad: self.frozen.map_or(T::zero(), |frozen| frozen.neighbour_rad),
+            energy_j: self.energy_j,
+            period_s: period.seconds(),
+        })
     }
 }
+
+/// What a late tick counts; one in time takes one off.
+const LATE_WEIGHT: u32 = 10;
+/// Most late ticks in a row that can be allowed.
+const LATE_TICKS_MOST: u32 = 1000;
 
 /// The watch, prepared for the joints of one hand.
 #[derive(Clone, Debug, PartialEq)]
@@ -186,6 +306,37 @@ pub struct Watch<T, const J: usize> {
     joint_count: usize,
     joints: [JointWatch<T>; J],
     saturated_ticks: Option<u32>,
+    frozen_ticks: Option<u32>,
+    heartbeat_ticks: Option<u32>,
+    neighbour_rad: T,
+    late_most: Option<u32>,
+    energy_j: Option<T>,
+    period_s: T,
+}
+
+/// What the watch remembers from tick to tick.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Watched<T, const J: usize> {
+    /// For how many ticks each joint has been at its torque limit.
+    saturated: [u32; J],
+    standstills: [Standstill<T>; J],
+    /// Ticks since the last heartbeat; at first there was none for ever.
+    silent: u32,
+    /// Late ticks, by weight.
+    late: u32,
+    /// Work of the last second, J.
+    energy_j: T,
+}
+
+/// For how long a counter has stood still.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Standstill<T> {
+    ticks: u32,
+    /// Torque when it last moved, N m.
+    torque_nm: T,
+    /// Where the neighbours were then, rad.
+    before_rad: T,
+    after_rad: T,
 }
 
 /// Where the faults of one joint begin.
@@ -195,6 +346,41 @@ struct JointWatch<T> {
     change: Option<T>,
     speed_rad_s: Option<T>,
     range_rad: Option<(T, T)>,
+    /// Change of torque that is too much for a joint that stands still, N m.
+    frozen_nm: Option<T>,
+    /// The joint that carries it.
+    before: Option<usize>,
+    /// A joint that it carries; of several, the last.
+    after: Option<usize>,
+}
+
+impl<T: Real, const J: usize> Watched<T, J> {
+    /// Nothing has happened yet.
+    pub fn new() -> Self {
+        Self {
+            saturated: [0; J],
+            standstills: [Standstill {
+                ticks: 0,
+                torque_nm: T::zero(),
+                before_rad: T::zero(),
+                after_rad: T::zero(),
+            }; J],
+            silent: u32::MAX,
+            late: 0,
+            energy_j: T::zero(),
+        }
+    }
+
+    /// Work of the joints in the last second, J; what was done earlier fades.
+    pub fn energy_j(&self) -> T {
+        self.energy_j
+    }
+}
+
+impl<T: Real, const J: usize> Default for Watched<T, J> {
+    fn default() -> Self {
+        Self::new()
+    }
 }
 
 impl<T: Real, const J: usize> Watch<T, J> {
@@ -217,17 +403,95 @@ impl<T: Real, const J: usize> Watch<T, J> {
     }
 
     /// Counts for how many ticks each joint has been at its torque limit; the first that was for too long.
-    pub fn saturation(&self, saturated: &mut [u32; J], limiting: &[Limiting; J]) -> Option<Raised> {
-        for (ticks, limiting) in saturated.iter_mut().zip(limiting) {
+    pub fn saturation(&self, watched: &mut Watched<T, J>, limiting: &[Limiting; J]) -> Option<Raised> {
+        for (ticks, limiting) in watched.saturated.iter_mut().zip(limiting) {
             *ticks = if limiting.contains(Limit::Torque) { ticks.saturating_add(1) } else { 0 };
         }
         let longest = self.saturated_ticks?;
-        let joint = saturated.iter().take(self.joint_count).position(|&ticks| ticks > longest)?;
+        let joint = watched.saturated.iter().take(self.joint_count).position(|&ticks| ticks > longest)?;
         Some(Raised::at(joint, Fault::SaturatedTooLong))
+    }
+
+    /// Counts the ticks since the last heartbeat; whether it fails.
+    pub fn heartbeat(&self, watched: &mut Watched<T, J>, heard: bool) -> bool {
+        watched.silent = if heard { 0 } else { watched.silent.saturating_add(1) };
+        self.silent(watched)
+    }
+
+    /// Whether the heartbeat fails.
+    pub fn silent(&self, watched: &Watched<T, J>) -> bool {
+        self.heartbeat_ticks.is_some_and(|longest| watched.silent > longest)
+    }
+
+    /// Counts late ticks; whether there were too many.
+    pub fn lateness(&self, watched: &mut Watched<T, J>, late: bool) -> Option<Raised> {
+        let most = self.late_most?;
+        watched.late = if late {
+            // Twice the limit is enough to be forgotten again in bounded time.
+            watched.late.saturating_add(LATE_WEIGHT).min(2 * most + LATE_WEIGHT)
+        } else {
+            watched.late.saturating_sub(1)
+        };
+        (watched.late > most).then_some(Raised::of_hand(Fault::TickLate))
+    }
+
+    /// Adds up the work of `torques_nm` in the last tick.
+    pub fn energy(
+        &self,
+        watched: &mut Watched<T, J>,
+        motion: &Motion<T, J>,
+        torques_nm: &[T; J],
+    ) -> Option<Raised> {
+        let mut power_w = T::zero();
+        for (torque, speed) in torques_nm.iter().zip(&motion.speeds_rad_s).take(self.joint_count) {
+            power_w += *torque * *speed;
+        }
+        // A first-order fade with a time constant of one second.
+        watched.energy_j += (power_w - watched.energy_j) * self.period_s;
+        let most = self.energy_j?;
+        (watched.energy_j > most).then_some(Raised::of_hand(Fault::TooMuchEnergy))
+    }
+
+    /// Looks for counters that stand still although their torque and a neighbour changed since they last moved.
+    /// `grasping`: what the joints do otherwise is not the law's doing.
+    pub fn standstill(
+        &self,
+        watched: &mut Watched<T, J>,
+        motion: &Motion<T, J>,
+        torques_nm: &[T; J],
+        grasping: bool,
+    ) -> Option<Raised> {
+        let longest = self.frozen_ticks?;
+        let mut frozen = None;
+        for k in 0..self.joint_count.min(J) {
+            let (joint, standstill) = (&self.joints[k], &mut watched.standstills[k]);
+            let angle_of = |neighbour: Option<usize>| {
+                neighbour.and_then(|k| motion.angles_rad.get(k)).copied().unwrap_or(T::zero())
+            };
+            let (torque_nm, before_rad, after_rad) =
+                (torques_nm[k], angle_of(joint.before), angle_of(joint.after));
+            if motion.count_changes[k] != 0 || !grasping {
+                *standstill = Standstill { ticks: 0, torque_nm, before_rad, after_rad };
+                continue;
+            }
+            standstill.ticks = standstill.ticks.saturating_add(1);
+            let driven =
+                joint.frozen_nm.is_some_and(|most| (torque_nm - standstill.torque_nm).magnitude() > most);
+            let dragged = (before_rad - standstill.before_rad).magnitude() > self.neighbour_rad
+                || (after_rad - standstill.after_rad).magnitude() > self.neighbour_rad;
+            if driven && dragged && standstill.ticks > longest {
+                frozen = frozen.or(Some(Raised::at(k, Fault::CounterFrozen)));
+            }
+        }
+        frozen
     }
 }
 
 impl<T: Real> JointWatch<T> {
+    /// Everything is left out.
+    const OFF: Self =
+        Self { change: None, speed_rad_s: None, range_rad: None, frozen_nm: None, before: None, after: None };
+
     fn motion(&self, angle_rad: T, speed_rad_s: T, count_change: u32) -> Option<Fault> {
         if !(angle_rad.is_finite() && speed_rad_s.is_finite()) {
             return Some(Fault::NotFinite);
@@ -260,6 +524,12 @@ mod tests {
             (4, Fault::BeyondRange),
             (5, Fault::Overspeed),
             (6, Fault::SaturatedTooLong),
+            (7, Fault::CounterFrozen),
+            (8, Fault::CounterReset),
+            (9, Fault::OutputFailed),
+            (10, Fault::LinkLost),
+            (11, Fault::TickLate),
+            (12, Fault::TooMuchEnergy),
         ];
         assert_eq!(numbers.len(), Fault::ALL.len());
         for (number, fault) in numbers {
@@ -267,7 +537,7 @@ mod tests {
             assert_eq!(Fault::from_number(number), Some(fault));
             assert!(!fault.words().is_empty() && !fault.remedy().is_empty());
         }
-        for number in [0, 7, 255] {
+        for number in [0, 13, 255] {
             assert_eq!(Fault::try_from(number), Err(UnknownFault(number)));
         }
     }
@@ -276,12 +546,32 @@ mod tests {
     fn a_fault_says_what_is_wrong_and_where() {
         let raised = Raised::at(3, Fault::Overspeed);
         assert_eq!(raised.to_string(), "fault 5: joint 3: speed is above its limit");
-        assert_eq!(Raised::at(1000, Fault::Overspeed).joint, 255);
+        assert_eq!(Raised::at(1000, Fault::Overspeed).joint, Some(255));
+        let raised = Raised::of_hand(Fault::LinkLost);
+        assert_eq!(raised.to_string(), "fault 10: heartbeat of the host stopped");
     }
+
+    /// A watch over two joints in which everything is switched off.
+    const BLIND: Watch<f64, 2> = Watch {
+        joint_count: 2,
+        joints: [JointWatch::OFF; 2],
+        saturated_ticks: None,
+        frozen_ticks: None,
+        neighbour_rad: 0.0,
+        heartbeat_ticks: None,
+        late_most: None,
+        energy_j: None,
+        period_s: 1e-3,
+    };
 
     #[test]
     fn each_fault_of_the_motion_begins_where_it_is_set() {
-        let watch = JointWatch { change: Some(600.0), speed_rad_s: Some(20.0), range_rad: Some((-1.0, 2.0)) };
+        let watch = JointWatch {
+            change: Some(600.0),
+            speed_rad_s: Some(20.0),
+            range_rad: Some((-1.0, 2.0)),
+            ..JointWatch::OFF
+        };
         assert_eq!(watch.motion(2.0, 20.0, 600), None);
         assert_eq!(watch.motion(-1.0, -20.0, 0), None);
         assert_eq!(watch.motion(0.0, 0.0, 601), Some(Fault::CountJump));
@@ -294,24 +584,108 @@ mod tests {
             assert_eq!(watch.motion(bad, 0.0, 0), Some(Fault::NotFinite));
             assert_eq!(watch.motion(0.0, bad, 0), Some(Fault::NotFinite));
         }
-        let off = JointWatch { change: None, speed_rad_s: None, range_rad: None };
-        assert_eq!(off.motion(1e9, 1e9, u32::MAX), None);
+        assert_eq!(JointWatch::<f64>::OFF.motion(1e9, 1e9, u32::MAX), None);
     }
 
     #[test]
     fn saturation_is_a_fault_after_its_time_without_a_break() {
-        let off = JointWatch::<f64> { change: None, speed_rad_s: None, range_rad: None };
-        let watch = Watch { joint_count: 2, joints: [off; 2], saturated_ticks: Some(10) };
+        let watch = Watch { saturated_ticks: Some(10), ..BLIND };
         let mut at_limit = Limiting::NONE;
         at_limit.insert(Limit::Torque);
-        let mut saturated = [0; 2];
+        let mut watched = Watched::new();
         for _ in 0..10 {
-            assert_eq!(watch.saturation(&mut saturated, &[Limiting::NONE, at_limit]), None);
+            assert_eq!(watch.saturation(&mut watched, &[Limiting::NONE, at_limit]), None);
         }
-        let mut interrupted = saturated;
+        let mut interrupted = watched.clone();
         assert_eq!(watch.saturation(&mut interrupted, &[Limiting::NONE; 2]), None);
-        assert_eq!(interrupted, [0, 0]);
-        let raised = watch.saturation(&mut saturated, &[Limiting::NONE, at_limit]);
+        assert_eq!(watch.saturation(&mut interrupted, &[Limiting::NONE, at_limit]), None);
+        let raised = watch.saturation(&mut watched, &[Limiting::NONE, at_limit]);
         assert_eq!(raised, Some(Raised::at(1, Fault::SaturatedTooLong)));
+    }
+
+    #[test]
+    fn a_heartbeat_fails_after_its_time_and_before_the_first() {
+        let watch = Watch { heartbeat_ticks: Some(5), ..BLIND };
+        let mut watched = Watched::new();
+        assert!(watch.heartbeat(&mut watched, false));
+        assert!(!watch.heartbeat(&mut watched, true));
+        for _ in 0..5 {
+            assert!(!watch.heartbeat(&mut watched, false));
+        }
+        assert!(watch.heartbeat(&mut watched, false));
+        assert!(!watch.heartbeat(&mut watched, true));
+        assert!(!BLIND.heartbeat(&mut Watched::new(), false));
+    }
+
+    #[test]
+    fn late_ticks_are_a_fault_in_a_row_or_too_often() {
+        let watch = Watch { late_most: Some(3 * LATE_WEIGHT), ..BLIND };
+        let found = |every: usize| {
+            let mut watched = Watched::new();
+            (0..10_000).find(|tick| watch.lateness(&mut watched, tick % every == 0).is_some())
+        };
+        assert_eq!(found(1), Some(3), "the fourth in a row");
+        assert_eq!(found(9), Some(99), "2 more in every 9 ticks");
+        assert_eq!(found(11), None);
+        // However long it lasted, it is over in bounded time.
+        let mut watched = Watched::new();
+        for _ in 0..10_000 {
+            watch.lateness(&mut watched, true);
+        }
+        let over = (0..10_000).find(|_| watch.lateness(&mut watched, false).is_none());
+        assert!(over.is_some_and(|ticks| ticks <= 40), "{over:?}");
+        assert_eq!(BLIND.lateness(&mut watched, true), None);
+    }
+
+    #[test]
+    fn energy_is_the_work_of_the_last_second() {
+        let watch = Watch { energy_j: Some(0.5), ..BLIND };
+        let mut watched = Watched::new();
+        let motion = Motion { speeds_rad_s: [2.0, -1.0], ..Motion::still() };
+        // 1 W: after a second 1 - 1/e J, after ln(2) s half a joule.
+        let found = (1..2000).find(|_| watch.energy(&mut watched, &motion, &[0.4, -0.2]).is_some());
+        assert_eq!(found, Some(693));
+        assert!(watched.energy_j() > 0.5 && watched.energy_j() < 0.501);
+        // Braking takes it back.
+        assert_eq!(watch.energy(&mut watched, &motion, &[-4.0, 0.0]), None);
+        assert_eq!(BLIND.energy(&mut watched, &motion, &[1e9, 0.0]), None);
+    }
+
+    #[test]
+    fn a_counter_is_frozen_when_torque_and_neighbour_change_and_it_does_not() {
+        let joints = [
+            JointWatch { frozen_nm: Some(0.1), after: Some(1), ..JointWatch::OFF },
+            JointWatch { frozen_nm: Some(0.1), before: Some(0), ..JointWatch::OFF },
+        ];
+        let watch = Watch { joints, frozen_ticks: Some(20), neighbour_rad: 0.03, ..BLIND };
+        let mut watched = Watched::new();
+        // Joint 1 and its neighbour's angle.
+        let mut look = |moves: bool, torque, neighbour_rad, grasping| {
+            let motion = Motion {
+                angles_rad: [neighbour_rad, 0.0],
+                count_changes: [1, u32::from(moves)],
+                ..Motion::still()
+            };
+            watch.standstill(&mut watched, &motion, &[0.0, torque], grasping)
+        };
+        let frozen = Some(Raised::at(1, Fault::CounterFrozen));
+        assert_eq!(look(true, 0.5, 0.0, true), None);
+        // Either alone is no reason to move, for however long.
+        for _ in 0..1000 {
+            assert_eq!(look(false, 0.9, 0.029, true), None);
+        }
+        for _ in 0..1000 {
+            assert_eq!(look(false, 0.599, -0.5, true), None);
+        }
+        assert_eq!(look(false, 0.601, 0.031, true), frozen);
+        assert_eq!(look(false, 0.399, -0.031, true), frozen);
+        // A single count clears it; then it takes the time again.
+        assert_eq!(look(true, 0.5, 0.0, true), None);
+        for _ in 0..20 {
+            assert_eq!(look(false, 0.7, 0.1, true), None);
+        }
+        assert_eq!(look(false, 0.7, 0.1, true), frozen);
+        assert_eq!(look(false, 0.7, 0.1, false), None);
+        assert_eq!(look(false, 0.7, 0.1, true), None);
     }
 }

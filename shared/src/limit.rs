@@ -95,6 +95,10 @@ impl fmt::Display for Limiting {
 /// Limits, as a user gives them; `None` leaves one out.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LimitConfig<T, const J: usize> {
+    /// Largest nominal grasping force that may be asked for, N.
+    pub force_n: Option<T>,
+    /// Largest attitude stiffness that may be asked for, N m.
+    pub attitude_stiffness_nm: Option<T>,
     /// Largest torque of each joint, N m.
     pub torque_nm: Option<[T; J]>,
     /// Largest change of each joint's torque, N m/s.
@@ -105,7 +109,8 @@ pub struct LimitConfig<T, const J: usize> {
 
 impl<T: Real, const J: usize> LimitConfig<T, J> {
     /// No limits.
-    pub const NONE: Self = Self { torque_nm: None, slew_nm_s: None, stops: None };
+    pub const NONE: Self =
+        Self { force_n: None, attitude_stiffness_nm: None, torque_nm: None, slew_nm_s: None, stops: None };
 }
 
 /// Soft end stops, as a user gives them.
@@ -122,6 +127,8 @@ pub struct StopConfig<T, const J: usize> {
 /// The limits, prepared for the joints of one hand.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Limits<T, const J: usize> {
+    force_n: Option<T>,
+    attitude_stiffness_nm: Option<T>,
     joint_count: usize,
     joints: [JointLimits<T>; J],
 }
@@ -158,6 +165,13 @@ impl<T: Real, const J: usize> LimitConfig<T, J> {
         hand: &Hand<T, J, F>,
         period: Period,
     ) -> Result<Limits<T, J>, ParameterError> {
+        for (limit, parameter) in
+            [(self.force_n, "limits.force_n"), (self.attitude_stiffness_nm, "limits.attitude_stiffness_nm")]
+        {
+            if limit.is_some_and(|limit| !(limit >= T::zero() && limit.is_finite())) {
+                return Err(ParameterError { parameter, joint: None, reason: "has to be zero or positive" });
+            }
+        }
         let joint_count = hand.joint_count().min(J);
         let mut joints = [JointLimits { torque_nm: None, slew_nm: None, stop: None }; J];
         for (k, joint) in joints.iter_mut().enumerate().take(joint_count) {
@@ -178,7 +192,12 @@ impl<T: Real, const J: usize> LimitConfig<T, J> {
                 joint.stop = Some(stops.prepare(k, hand.range_rad(k))?);
             }
         }
-        Ok(Limits { joint_count, joints })
+        Ok(Limits {
+            force_n: self.force_n,
+            attitude_stiffness_nm: self.attitude_stiffness_nm,
+            joint_count,
+            joints,
+        })
     }
 }
 
@@ -212,6 +231,18 @@ fn is_positive<T: Real>(v: T) -> bool {
 }
 
 impl<T: Real, const J: usize> Limits<T, J> {
+    /// Whether a nominal grasping force may be asked for.
+    pub fn allows_force(&self, force_n: T) -> bool {
+        force_n >= T::zero() && force_n.is_finite() && self.force_n.is_none_or(|most| force_n <= most)
+    }
+
+    /// Whether an attitude stiffness may be asked for.
+    pub fn allows_attitude_stiffness(&self, stiffness_nm: T) -> bool {
+        stiffness_nm >= T::zero()
+            && stiffness_nm.is_finite()
+            && self.attitude_stiffness_nm.is_none_or(|most| stiffness_nm <= most)
+    }
+
     /// Takes the wanted torques to the allowed ones, N m, and says what limited each joint.
     pub fn apply(
         &self,

@@ -38,6 +38,9 @@ pub trait Real:
     /// The nearest value of this type. Meant for constants: the compiler folds it.
     fn from_f64(value: f64) -> Self;
 
+    /// This value of a message.
+    fn from_f32(value: f32) -> Self;
+
     /// This value as an `f64`, exactly. For hosts and tests; the tick never calls it.
     fn to_f64(self) -> f64;
 
@@ -97,6 +100,11 @@ impl Real for f32 {
         value as f32
     }
 
+    #[inline]
+    fn from_f32(value: f32) -> f32 {
+        value
+    }
+
     fn to_f64(self) -> f64 {
         f64::from(self)
     }
@@ -124,6 +132,11 @@ impl Real for f64 {
     #[inline]
     fn from_f64(value: f64) -> f64 {
         value
+    }
+
+    #[inline]
+    fn from_f32(value: f32) -> f64 {
+        f64::from(value)
     }
 
     fn to_f64(self) -> f64 {

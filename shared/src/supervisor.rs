@@ -19,12 +19,16 @@
 //!
 //! With `!`: refused, for this reason. A command that asks for what already is, is done and changes nothing; a grasp is
 //! not latched anew. `Stop` is done in every mode; it does not hide a fault. `ClearFault` is refused (`FaultPersists`)
-//! while the cause is there.
+//! while the cause is there. Where the table takes a command, its tick may still object: no arming without a heartbeat.
+//!
+//! A fault whose reaction is to let go (the loss of the link) turns a grasp into a release, and ends in the mode
+//! *fault* like any other: when the release is over, or at once where there is nothing to release. Without torque it is
+//! no fault: then nobody needs the link.
 //!
 //! In a tick, a fault that is there comes first, then the command, then the end of a release.
 
 use crate::command::{Answer, Command, Refusal};
-use crate::fault::Raised;
+use crate::fault::{Raised, Reaction};
 use crate::math::Real;
 use crate::parameter::ParameterError;
 use crate::period::Period;
@@ -62,7 +66,7 @@ impl Mode {
 }
 
 /// What may happen in a mode: the commands, and what the tick itself notices.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Event {
     /// A command.
     Command(Command),
@@ -100,7 +104,14 @@ const TABLE: [[Outcome; 8]; 5] = {
 /// What an event leads to in a mode.
 pub fn outcome(mode: Mode, event: Event) -> Outcome {
     let column = match event {
-        Event::Command(command) => command as usize,
+        Event::Command(command) => match command {
+            Command::Arm => 0,
+            Command::Disarm => 1,
+            Command::Grasp(_) => 2,
+            Command::Release => 3,
+            Command::Stop => 4,
+            Command::ClearFault => 5,
+        },
         Event::Fault => 6,
         Event::Released => 7,
     };
@@ -198,32 +209,42 @@ impl Supervisor {
         self.mode
     }
 
-    /// The fault that led to the mode [`Mode::Fault`].
+    /// The fault that led to the mode [`Mode::Fault`], or lets the object go now.
     pub const fn fault(&self) -> Option<Raised> {
         self.fault
     }
 
-    /// Begins a tick: `fault` is one that is there now. Answers the command.
+    /// Begins a tick: `fault` is one that is there now, `objection` why the command can't be done even in a mode that
+    /// takes it. Answers the command.
     pub fn begin<T: Real>(
         &mut self,
         ramps: &Ramps<T>,
         fault: Option<Raised>,
         command: Option<Command>,
+        objection: Option<Refusal>,
     ) -> Option<Answer> {
         self.age = self.age.saturating_add(1);
         if let Some(raised) = fault {
             self.raise(raised);
         }
-        let answer = command.map(|command| Answer { command, refused: self.obey(command, fault) });
+        let answer = command.map(|command| Answer { command, refused: self.obey(command, fault, objection) });
         if self.mode == Mode::Releasing && self.age >= ramps.release.ticks {
             self.take(Event::Released);
         }
         answer
     }
 
-    /// Enters the mode [`Mode::Fault`]; the fault that came first is kept.
+    /// Does what the fault asks for; the fault that came first is kept.
     pub fn raise(&mut self, raised: Raised) {
-        self.take(Event::Fault);
+        let event = match raised.fault.reaction() {
+            Reaction::TorqueOff => Event::Fault,
+            Reaction::Release => match self.mode {
+                Mode::Disarmed => return,
+                Mode::Armed | Mode::Fault => Event::Fault,
+                Mode::Grasping | Mode::Releasing => Event::Command(Command::Release),
+            },
+        };
+        self.take(event);
         self.fault = self.fault.or(Some(raised));
     }
 
@@ -242,11 +263,20 @@ impl Supervisor {
         }
     }
 
-    fn obey(&mut self, command: Command, fault: Option<Raised>) -> Option<Refusal> {
+    fn obey(
+        &mut self,
+        command: Command,
+        fault: Option<Raised>,
+        objection: Option<Refusal>,
+    ) -> Option<Refusal> {
         if command == Command::ClearFault && fault.is_some() {
             return Some(Refusal::FaultPersists);
         }
-        self.take(Event::Command(command))
+        let event = Event::Command(command);
+        match (outcome(self.mode, event), objection) {
+            (Outcome::Enter(_), Some(objection)) => Some(objection),
+            _ => self.take(event),
+        }
     }
 
     fn take(&mut self, event: Event) -> Option<Refusal> {
@@ -254,6 +284,9 @@ impl Supervisor {
             Outcome::Refuse(refusal) => return Some(refusal),
             Outcome::Enter(mode) if mode == self.mode => {}
             Outcome::Enter(mode) => {
+                // A fault that lets go is not hidden by a Stop, nor forgotten at the end of the release.
+                let letting_go = self.mode == Mode::Releasing && self.fault.is_some();
+                let mode = if letting_go { Mode::Fault } else { mode };
                 if mode == Mode::Releasing {
                     self.grasped = self.age.saturating_sub(1);
                 }
@@ -277,11 +310,13 @@ impl Default for Supervisor {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::command::Grasp;
     use crate::fault::Fault;
     use std::format;
     use std::vec::Vec;
 
-    const RAISED: Raised = Raised { fault: Fault::Overspeed, joint: 2 };
+    const RAISED: Raised = Raised { fault: Fault::Overspeed, joint: Some(2) };
+    const GRASP: Command = Command::Grasp(Grasp::CONFIGURED);
 
     fn ramps(soft_start_ms: u32, release_ms: u32) -> Ramps<f64> {
         SupervisorConfig { soft_start_ms, release_ms }.prepare(Period::from_us(1000).unwrap()).unwrap()
@@ -293,15 +328,15 @@ mod tests {
         let commands: &[Command] = match mode {
             Mode::Disarmed | Mode::Fault => &[],
             Mode::Armed => &[Command::Arm],
-            Mode::Grasping => &[Command::Arm, Command::Grasp],
-            Mode::Releasing => &[Command::Arm, Command::Grasp, Command::Release],
+            Mode::Grasping => &[Command::Arm, GRASP],
+            Mode::Releasing => &[Command::Arm, GRASP, Command::Release],
         };
         for &command in commands {
-            let answer = supervisor.begin(ramps, None, Some(command));
+            let answer = supervisor.begin(ramps, None, Some(command), None);
             assert_eq!(answer, Some(Answer { command, refused: None }));
         }
         if mode == Mode::Fault {
-            supervisor.begin(ramps, Some(RAISED), None);
+            supervisor.begin(ramps, Some(RAISED), None, None);
         }
         assert_eq!(supervisor.mode(), mode);
         supervisor
@@ -343,7 +378,7 @@ mod tests {
                     assert_eq!((mode, event), (Mode::Disarmed, Event::Command(Command::Arm)));
                 }
                 if next == Mode::Grasping && mode != Mode::Grasping {
-                    assert_eq!((mode, event), (Mode::Armed, Event::Command(Command::Grasp)));
+                    assert_eq!((mode, event), (Mode::Armed, Event::Command(GRASP)));
                 }
                 // A fault is left by ClearFault alone.
                 if mode == Mode::Fault && next != Mode::Fault {
@@ -364,7 +399,7 @@ mod tests {
         for mode in Mode::ALL {
             for command in Command::ALL {
                 let mut supervisor = in_mode(mode, &ramps);
-                let answer = supervisor.begin(&ramps, None, Some(command)).unwrap();
+                let answer = supervisor.begin(&ramps, None, Some(command), None).unwrap();
                 assert_eq!(answer.command, command);
                 let (next, refused) = match outcome(mode, Event::Command(command)) {
                     Outcome::Enter(next) => (next, None),
@@ -385,7 +420,7 @@ mod tests {
         for mode in Mode::ALL {
             for command in Command::ALL {
                 let mut supervisor = in_mode(mode, &ramps);
-                let answer = supervisor.begin(&ramps, Some(RAISED), Some(command)).unwrap();
+                let answer = supervisor.begin(&ramps, Some(RAISED), Some(command), None).unwrap();
                 assert_eq!((supervisor.mode(), supervisor.drive(&ramps)), (Mode::Fault, Drive::Off));
                 let refusal = match command {
                     Command::Stop => None,
@@ -401,12 +436,68 @@ mod tests {
     fn the_first_fault_is_the_one_that_is_reported() {
         let ramps = ramps(100, 100);
         let mut supervisor = in_mode(Mode::Fault, &ramps);
-        supervisor.begin(&ramps, Some(Raised::at(0, Fault::CountJump)), None);
+        supervisor.begin(&ramps, Some(Raised::at(0, Fault::CountJump)), None, None);
         assert_eq!(supervisor.fault(), Some(RAISED));
-        supervisor.begin(&ramps, None, Some(Command::ClearFault));
+        supervisor.begin(&ramps, None, Some(Command::ClearFault), None);
         assert_eq!((supervisor.mode(), supervisor.fault()), (Mode::Disarmed, None));
-        supervisor.begin(&ramps, Some(Raised::at(0, Fault::CountJump)), None);
+        supervisor.begin(&ramps, Some(Raised::at(0, Fault::CountJump)), None, None);
         assert_eq!(supervisor.fault(), Some(Raised::at(0, Fault::CountJump)));
+    }
+
+    const LINK_LOST: Raised = Raised::of_hand(Fault::LinkLost);
+
+    #[test]
+    fn a_lost_link_lets_go_and_then_is_a_fault() {
+        let ramps = ramps(4, 4);
+        for stopped in [false, true] {
+            let mut supervisor = in_mode(Mode::Grasping, &ramps);
+            for left in [0.75, 0.5, 0.25] {
+                supervisor.begin(&ramps, Some(LINK_LOST), None, None);
+                assert_eq!((supervisor.mode(), supervisor.fault()), (Mode::Releasing, Some(LINK_LOST)));
+                near(shares(&supervisor, &ramps), 0.25 * left, left);
+            }
+            // The link may come back meanwhile: what began is brought to its end, and is not hidden by a stop.
+            let command = stopped.then_some(Command::Stop);
+            supervisor.begin(&ramps, None, command, None);
+            assert_eq!(supervisor.mode() == Mode::Fault, stopped);
+            supervisor.begin(&ramps, None, None, None);
+            assert_eq!((supervisor.mode(), supervisor.fault()), (Mode::Fault, Some(LINK_LOST)));
+            supervisor.begin(&ramps, None, Some(Command::ClearFault), None);
+            assert_eq!((supervisor.mode(), supervisor.fault()), (Mode::Disarmed, None));
+        }
+        for (mode, next) in [
+            (Mode::Disarmed, Mode::Disarmed),
+            (Mode::Armed, Mode::Fault),
+            (Mode::Releasing, Mode::Releasing),
+            (Mode::Fault, Mode::Fault),
+        ] {
+            let mut supervisor = in_mode(mode, &ramps);
+            supervisor.begin(&ramps, Some(LINK_LOST), None, None);
+            assert_eq!(supervisor.mode(), next, "from {mode:?}");
+            assert_eq!(supervisor.fault().is_some(), next != Mode::Disarmed);
+        }
+        // Another fault takes the torque away at once; the first is the one that is reported.
+        let mut supervisor = in_mode(Mode::Grasping, &ramps);
+        supervisor.begin(&ramps, Some(LINK_LOST), None, None);
+        supervisor.begin(&ramps, Some(RAISED), None, None);
+        assert_eq!((supervisor.mode(), supervisor.fault()), (Mode::Fault, Some(LINK_LOST)));
+    }
+
+    #[test]
+    fn an_objection_refuses_what_the_table_would_take_and_nothing_else() {
+        let ramps = ramps(100, 100);
+        let objection = Some(Refusal::NoHeartbeat);
+        for mode in Mode::ALL {
+            for command in Command::ALL {
+                let mut supervisor = in_mode(mode, &ramps);
+                let answer = supervisor.begin(&ramps, None, Some(command), objection).unwrap();
+                let refused = match outcome(mode, Event::Command(command)) {
+                    Outcome::Enter(_) => objection,
+                    Outcome::Refuse(refusal) => Some(refusal),
+                };
+                assert_eq!((answer.refused, supervisor.mode()), (refused, mode));
+            }
+        }
     }
 
     /// Force and attitude shares of a tick.
@@ -428,13 +519,13 @@ mod tests {
         let mut supervisor = in_mode(Mode::Grasping, &ramps);
         for force in [0.25, 0.5, 0.75, 1.0, 1.0] {
             near(shares(&supervisor, &ramps), force, 1.0);
-            supervisor.begin(&ramps, None, None);
+            supervisor.begin(&ramps, None, None, None);
         }
-        supervisor.begin(&ramps, None, Some(Command::Release));
+        supervisor.begin(&ramps, None, Some(Command::Release), None);
         for left in [0.8, 0.6, 0.4, 0.2, 0.0] {
             assert_eq!(supervisor.mode(), Mode::Releasing);
             near(shares(&supervisor, &ramps), left, left);
-            supervisor.begin(&ramps, None, None);
+            supervisor.begin(&ramps, None, None, None);
         }
         assert_eq!((supervisor.mode(), supervisor.drive(&ramps)), (Mode::Armed, Drive::Hold));
     }
@@ -443,11 +534,11 @@ mod tests {
     fn a_release_amid_the_soft_start_begins_from_the_force_reached() {
         let ramps = ramps(4, 2);
         let mut supervisor = in_mode(Mode::Grasping, &ramps);
-        supervisor.begin(&ramps, None, None);
+        supervisor.begin(&ramps, None, None, None);
         near(shares(&supervisor, &ramps), 0.5, 1.0);
-        supervisor.begin(&ramps, None, Some(Command::Release));
+        supervisor.begin(&ramps, None, Some(Command::Release), None);
         near(shares(&supervisor, &ramps), 0.25, 0.5);
-        supervisor.begin(&ramps, None, Some(Command::Release));
+        supervisor.begin(&ramps, None, Some(Command::Release), None);
         near(shares(&supervisor, &ramps), 0.0, 0.0);
     }
 
@@ -456,7 +547,7 @@ mod tests {
         let ramps = ramps(0, 0);
         let mut supervisor = in_mode(Mode::Grasping, &ramps);
         near(shares(&supervisor, &ramps), 1.0, 1.0);
-        supervisor.begin(&ramps, None, Some(Command::Release));
+        supervisor.begin(&ramps, None, Some(Command::Release), None);
         assert_eq!(supervisor.mode(), Mode::Armed);
     }
 
@@ -465,7 +556,7 @@ mod tests {
         let ramps = ramps(4, 2);
         let mut supervisor = Supervisor { age: u32::MAX - 1, ..in_mode(Mode::Grasping, &ramps) };
         for _ in 0..4 {
-            supervisor.begin(&ramps, None, None);
+            supervisor.begin(&ramps, None, None, None);
             near(shares(&supervisor, &ramps), 1.0, 1.0);
         }
     }

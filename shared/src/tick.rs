@@ -1,22 +1,21 @@
 //! The product: one function that takes the joint counts of this millisecond to the torques of the next.
 //!
 //! ```text
-//! counts --> estimate q, dq --> supervise --> grasp law --> limit --> torques
-//!                                   |                                    |
-//!                                command                              Record --> telemetry
+//! counts --> estimate q, dq --> watch, supervise --> grasp law --> limit --> torques
+//!                                       |                                     |
+//!                                command, events                           Record --> telemetry
 //! ```
 //!
-//! It is pure: parameters, state, inputs, and nothing else. It cannot fail and does not panic; what goes wrong is a
-//! numbered fault. There are three entries, which differ in what they know of the joints and share all the rest:
-//! [`tick`] has encoder counts, [`tick_with`] has ideal angles and speeds (a simulation without encoders), and
-//! [`tick_blind`] has nothing, because a joint could not be read.
+//! It is pure: parameters, state, input, and nothing else. It cannot fail and does not panic; what goes wrong is a
+//! numbered fault.
 //!
 //! Torques are those of the tick's end: what is computed from the counts of this tick acts from the next.
 
-use crate::command::Command;
+use crate::command::{Command, Grasp, Refusal};
 use crate::control::{GraspConfig, GraspLaw, Grip, Latch, Monitor};
 use crate::estimate::{Estimator, EstimatorConfig, Motion, Tracks};
-use crate::fault::{Fault, FaultConfig, Raised, Watch};
+use crate::event::{Event, Events};
+use crate::fault::{Fault, FaultConfig, Raised, Watch, Watched};
 use crate::hand::{Hand, Posture};
 use crate::limit::{LimitConfig, Limiting, Limits};
 use crate::math::Real;
@@ -46,14 +45,44 @@ pub struct Config<T, const J: usize> {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Params<T, const J: usize, const F: usize> {
     hand: Hand<T, J, F>,
+    prepared: Prepared<T, J>,
+}
+
+/// A configuration, checked and prepared.
+#[derive(Clone, Debug, PartialEq)]
+struct Prepared<T, const J: usize> {
+    config: Config<T, J>,
     period: Period,
     estimator: Estimator<T, J>,
     law: GraspLaw<T, J>,
-    /// `f_d` at full force, N.
-    force_n: T,
     limits: Limits<T, J>,
     watch: Watch<T, J>,
     ramps: Ramps<T>,
+}
+
+impl<T: Real, const J: usize> Prepared<T, J> {
+    fn new<const F: usize>(hand: &Hand<T, J, F>, config: &Config<T, J>) -> Result<Self, ParameterError> {
+        let period = Period::from_us(config.period_us)?;
+        let estimator = config.estimator.prepare(hand.joint_count(), period)?;
+        let limits = config.limits.prepare(hand, period)?;
+        let law = config.law.prepare(hand)?;
+        let fail = |parameter, reason| Err(ParameterError { parameter, joint: None, reason });
+        if !limits.allows_force(law.force_n()) {
+            return fail("force_n", "has to be at most limits.force_n");
+        }
+        if !limits.allows_attitude_stiffness(law.attitude_stiffness_nm()) {
+            return fail("attitude_stiffness_nm", "has to be at most limits.attitude_stiffness_nm");
+        }
+        Ok(Self {
+            law,
+            limits,
+            watch: config.faults.prepare(hand, &estimator, period)?,
+            ramps: config.supervisor.prepare(period)?,
+            period,
+            estimator,
+            config: *config,
+        })
+    }
 }
 
 impl<T: Real, const J: usize, const F: usize> Params<T, J, F> {
@@ -62,18 +91,16 @@ impl<T: Real, const J: usize, const F: usize> Params<T, J, F> {
     /// # Errors
     /// The first parameter that is wrong, with its joint and the reason.
     pub fn new(hand: Hand<T, J, F>, config: &Config<T, J>) -> Result<Self, ParameterError> {
-        let period = Period::from_us(config.period_us)?;
-        let estimator = config.estimator.prepare(hand.joint_count(), period)?;
-        Ok(Self {
-            law: config.law.prepare(&hand)?,
-            force_n: config.law.force_n,
-            limits: config.limits.prepare(&hand, period)?,
-            watch: config.faults.prepare(&hand, &estimator, period)?,
-            ramps: config.supervisor.prepare(period)?,
-            hand,
-            period,
-            estimator,
-        })
+        Ok(Self { prepared: Prepared::new(&hand, config)?, hand })
+    }
+
+    /// Exchanges the configuration; a hand in motion would jump.
+    ///
+    /// # Errors
+    /// As [`Self::new`]; nothing changes then.
+    pub fn configure(&mut self, config: &Config<T, J>) -> Result<(), ParameterError> {
+        self.prepared = Prepared::new(&self.hand, config)?;
+        Ok(())
     }
 
     /// The hand.
@@ -81,19 +108,24 @@ impl<T: Real, const J: usize, const F: usize> Params<T, J, F> {
         &self.hand
     }
 
+    /// The configuration.
+    pub fn config(&self) -> &Config<T, J> {
+        &self.prepared.config
+    }
+
     /// The tick period.
     pub fn period(&self) -> Period {
-        self.period
+        self.prepared.period
     }
 
     /// The estimator: its delay and noise.
     pub fn estimator(&self) -> &Estimator<T, J> {
-        &self.estimator
+        &self.prepared.estimator
     }
 
     /// The grasp law.
     pub fn law(&self) -> &GraspLaw<T, J> {
-        &self.law
+        &self.prepared.law
     }
 }
 
@@ -104,14 +136,22 @@ pub struct State<T, const J: usize, const F: usize> {
     tracks: Tracks<T, J>,
     motion: Motion<T, J>,
     supervisor: Supervisor,
+    watched: Watched<T, J>,
+    /// How firmly this grasp is, when it is at its full force.
+    grasp: Firmness<T>,
     /// The fingertips' attitudes when the grasp began, while there is one.
     latch: Option<Latch<T, F>>,
     /// Where everything was in the last tick with torque.
     posture: Posture<T, J, F>,
     /// Torques of the last tick, N m.
     torques_nm: [T; J],
-    /// For how many ticks each joint has been at its torque limit.
-    saturated: [u32; J],
+}
+
+/// Force `f_d`, N, and attitude stiffness `K_st`, N m.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Firmness<T> {
+    force_n: T,
+    attitude_stiffness_nm: T,
 }
 
 impl<T: Real, const J: usize, const F: usize> State<T, J, F> {
@@ -122,10 +162,11 @@ impl<T: Real, const J: usize, const F: usize> State<T, J, F> {
             tracks: Tracks::new(),
             motion: Motion::still(),
             supervisor: Supervisor::new(),
+            watched: Watched::new(),
+            grasp: Firmness { force_n: T::zero(), attitude_stiffness_nm: T::zero() },
             latch: None,
             posture: Posture::at_base(),
             torques_nm: [T::zero(); J],
-            saturated: [0; J],
         }
     }
 
@@ -144,7 +185,7 @@ impl<T: Real, const J: usize, const F: usize> State<T, J, F> {
         self.supervisor.mode()
     }
 
-    /// The fault that the hand is in.
+    /// The fault that the hand is in, or that lets the object go.
     pub fn fault(&self) -> Option<Raised> {
         self.supervisor.fault()
     }
@@ -161,6 +202,56 @@ impl<T: Real, const J: usize, const F: usize> Default for State<T, J, F> {
     }
 }
 
+/// What a tick takes in.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Input<'a, T, const J: usize> {
+    /// What is known of the joints.
+    pub sensed: Sensed<'a, T, J>,
+    /// What else happened.
+    pub events: Events,
+    /// What the user asks for.
+    pub command: Option<Command>,
+}
+
+/// What is known of the joints in a tick.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Sensed<'a, T, const J: usize> {
+    /// Encoder counts.
+    Counts(&'a [i32; J]),
+    /// Angles, rad, and speeds, rad/s, of a simulation without encoders.
+    Ideal {
+        /// Joint angles, rad.
+        angles_rad: &'a [T; J],
+        /// Joint speeds, rad/s.
+        speeds_rad_s: &'a [T; J],
+    },
+    /// Nothing, because the joints could not be read or driven. The estimator starts anew with the next counts.
+    Failed(Raised),
+}
+
+impl<'a, T: Real, const J: usize> Input<'a, T, J> {
+    /// Counts, and perhaps a command.
+    pub fn counts(counts: &'a [i32; J], command: Option<Command>) -> Self {
+        Self { sensed: Sensed::Counts(counts), events: Events::NONE, command }
+    }
+
+    /// Ideal angles, rad, and speeds, rad/s, and perhaps a command.
+    pub fn ideal(angles_rad: &'a [T; J], speeds_rad_s: &'a [T; J], command: Option<Command>) -> Self {
+        Self { sensed: Sensed::Ideal { angles_rad, speeds_rad_s }, events: Events::NONE, command }
+    }
+
+    /// A failed reading, and perhaps a command.
+    pub fn failed(raised: Raised, command: Option<Command>) -> Self {
+        Self { sensed: Sensed::Failed(raised), events: Events::NONE, command }
+    }
+
+    /// The same with events.
+    #[must_use]
+    pub fn with(self, events: Events) -> Self {
+        Self { events, ..self }
+    }
+}
+
 /// What a tick puts out.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Output<T, const J: usize> {
@@ -170,43 +261,142 @@ pub struct Output<T, const J: usize> {
     pub record: Record<T, J>,
 }
 
-/// One tick from encoder counts.
+/// One tick.
 pub fn tick<T: Real, const J: usize, const F: usize>(
     params: &Params<T, J, F>,
     state: &mut State<T, J, F>,
-    counts: &[i32; J],
-    command: Option<Command>,
+    input: &Input<'_, T, J>,
 ) -> Output<T, J> {
-    state.motion = params.estimator.update(&mut state.tracks, counts);
-    let fault = params.watch.motion(&state.motion);
-    let counts = List::first_of(*counts, params.hand.joint_count());
-    from_motion(params, state, counts, fault, command)
+    let sensed = sense(params, state, &input.sensed);
+    let fault = watch(params, state, input, sensed);
+    let objection = input.command.and_then(|command| object(params, state, input.events, command));
+    let before = state.supervisor.mode();
+    let answer = state.supervisor.begin(&params.prepared.ramps, fault, input.command, objection);
+    if let (Some(Command::Grasp(grasp)), Mode::Grasping) = (input.command, state.supervisor.mode())
+        && before != Mode::Grasping
+    {
+        state.grasp = firmness(params, grasp);
+    }
+    let mut action = act(params, state);
+
+    // The last gate: what came out may itself be a fault, and takes the torque away in this very tick.
+    let saturation = params.prepared.watch.saturation(&mut state.watched, &action.limiting);
+    if let Some(raised) = action.not_finite.or(saturation) {
+        state.supervisor.raise(raised);
+        state.latch = None;
+        action = Action::none();
+    }
+    state.torques_nm = action.torques_nm;
+
+    let joint_count = params.hand.joint_count();
+    let (counts, reading_failed) = match input.sensed {
+        Sensed::Counts(counts) => (List::first_of(*counts, joint_count), None),
+        Sensed::Ideal { .. } => (List::first_of([0; J], 0), None),
+        Sensed::Failed(raised) => (List::first_of([0; J], 0), Some(raised)),
+    };
+    let record = Record {
+        sequence: state.ticks,
+        tick: state.ticks,
+        mode: state.supervisor.mode(),
+        fault: state.supervisor.fault(),
+        answer,
+        events: input.events,
+        reading_failed,
+        force_n: action.grip.force_n,
+        attitude_stiffness_nm: action.grip.attitude_stiffness_nm,
+        approach_potential_j: action.monitor.approach_potential_j,
+        attitude_potential_j: action.monitor.attitude_potential_j,
+        energy_j: state.watched.energy_j(),
+        cycles: 0,
+        dropped: 0,
+        counts,
+        torques_nm: List::first_of(action.torques_nm, joint_count),
+        limiting: List::first_of(action.limiting, joint_count),
+    };
+    state.ticks = state.ticks.wrapping_add(1);
+    Output { torques_nm: action.torques_nm, record }
 }
 
-/// One tick from ideal angles (rad) and speeds (rad/s), without encoders.
-pub fn tick_with<T: Real, const J: usize, const F: usize>(
+/// Updates the motion; the fault of the reading or of what it shows.
+fn sense<T: Real, const J: usize, const F: usize>(
     params: &Params<T, J, F>,
     state: &mut State<T, J, F>,
-    angles_rad: &[T; J],
-    speeds_rad_s: &[T; J],
-    command: Option<Command>,
-) -> Output<T, J> {
-    state.motion = Motion { angles_rad: *angles_rad, speeds_rad_s: *speeds_rad_s, ..Motion::still() };
-    state.tracks.restart();
-    let fault = params.watch.motion(&state.motion);
-    from_motion(params, state, List::first_of([0; J], 0), fault, command)
+    sensed: &Sensed<'_, T, J>,
+) -> Option<Raised> {
+    match *sensed {
+        Sensed::Counts(counts) => state.motion = params.prepared.estimator.update(&mut state.tracks, counts),
+        Sensed::Ideal { angles_rad, speeds_rad_s } => {
+            state.motion = Motion { angles_rad: *angles_rad, speeds_rad_s: *speeds_rad_s, ..Motion::still() };
+            state.tracks.restart();
+        }
+        Sensed::Failed(raised) => {
+            state.tracks.restart();
+            return Some(raised);
+        }
+    }
+    params.prepared.watch.motion(&state.motion)
 }
 
-/// One tick in which a joint could not be read: a fault. The estimator starts anew with the next sample.
-pub fn tick_blind<T: Real, const J: usize, const F: usize>(
+/// The first fault that is there at the beginning of the tick.
+fn watch<T: Real, const J: usize, const F: usize>(
     params: &Params<T, J, F>,
     state: &mut State<T, J, F>,
-    joint: usize,
-    command: Option<Command>,
-) -> Output<T, J> {
-    state.tracks.restart();
-    let fault = Some(Raised::at(joint, Fault::SampleMissing));
-    from_motion(params, state, List::first_of([0; J], 0), fault, command)
+    input: &Input<'_, T, J>,
+    sensed: Option<Raised>,
+) -> Option<Raised> {
+    let State { watched, motion, torques_nm, supervisor, .. } = state;
+    // Each of them counts something, and is asked in every tick.
+    let late = params.prepared.watch.lateness(watched, input.events.contains(Event::Late));
+    let silent = params.prepared.watch.heartbeat(watched, input.events.contains(Event::Heartbeat));
+    let energy = params.prepared.watch.energy(watched, motion, torques_nm);
+    let frozen = match input.sensed {
+        Sensed::Counts(_) => {
+            let grasping = matches!(supervisor.mode(), Mode::Grasping | Mode::Releasing);
+            params.prepared.watch.standstill(watched, motion, torques_nm, grasping)
+        }
+        Sensed::Ideal { .. } | Sensed::Failed(_) => None,
+    };
+    let powered = !matches!(supervisor.mode(), Mode::Disarmed | Mode::Fault);
+    let lost = (silent && powered).then_some(Raised::of_hand(Fault::LinkLost));
+    sensed.or(late).or(energy).or(frozen).or(lost)
+}
+
+/// Why a command can't be done even in a mode that takes it.
+fn object<T: Real, const J: usize, const F: usize>(
+    params: &Params<T, J, F>,
+    state: &State<T, J, F>,
+    events: Events,
+    command: Command,
+) -> Option<Refusal> {
+    match command {
+        Command::Arm if events.contains(Event::FallbackClock) => Some(Refusal::FallbackClock),
+        Command::Arm if params.prepared.watch.silent(&state.watched) => Some(Refusal::NoHeartbeat),
+        Command::Grasp(grasp) => {
+            let Firmness { force_n, attitude_stiffness_nm } = firmness(params, grasp);
+            if !(force_n.is_finite() && attitude_stiffness_nm.is_finite()) {
+                Some(Refusal::NotFinite)
+            } else if !(params.prepared.limits.allows_force(force_n)
+                && params.prepared.limits.allows_attitude_stiffness(attitude_stiffness_nm))
+            {
+                Some(Refusal::OutOfRange)
+            } else {
+                // To be told that it is done would be wrong for a grasp of other firmness.
+                let other = Firmness { force_n, attitude_stiffness_nm } != state.grasp;
+                (state.supervisor.mode() == Mode::Grasping && other).then_some(Refusal::Grasping)
+            }
+        }
+        _ => None,
+    }
+}
+
+/// How firmly a command wants to grasp.
+fn firmness<T: Real, const J: usize, const F: usize>(params: &Params<T, J, F>, grasp: Grasp) -> Firmness<T> {
+    Firmness {
+        force_n: grasp.force_n.map_or(params.prepared.law.force_n(), T::from_f32),
+        attitude_stiffness_nm: grasp
+            .attitude_stiffness_nm
+            .map_or(params.prepared.law.attitude_stiffness_nm(), T::from_f32),
+    }
 }
 
 /// What the joints are to be given, and why.
@@ -215,8 +405,7 @@ struct Action<T, const J: usize> {
     limiting: [Limiting; J],
     /// A torque that is not a finite number.
     not_finite: Option<Raised>,
-    force_n: T,
-    attitude_stiffness_nm: T,
+    grip: Firmness<T>,
     monitor: Monitor<T>,
 }
 
@@ -227,50 +416,10 @@ impl<T: Real, const J: usize> Action<T, J> {
             torques_nm: [T::zero(); J],
             limiting: [Limiting::NONE; J],
             not_finite: None,
-            force_n: T::zero(),
-            attitude_stiffness_nm: T::zero(),
+            grip: Firmness { force_n: T::zero(), attitude_stiffness_nm: T::zero() },
             monitor: Monitor { approach_potential_j: T::zero(), attitude_potential_j: T::zero() },
         }
     }
-}
-
-/// The tick after the estimator: supervise, law, limit, record.
-fn from_motion<T: Real, const J: usize, const F: usize>(
-    params: &Params<T, J, F>,
-    state: &mut State<T, J, F>,
-    counts: List<i32, J>,
-    fault: Option<Raised>,
-    command: Option<Command>,
-) -> Output<T, J> {
-    let answer = state.supervisor.begin(&params.ramps, fault, command);
-    let mut action = act(params, state);
-
-    // The last gate: what came out may itself be a fault, and takes the torque away in this very tick.
-    let saturation = params.watch.saturation(&mut state.saturated, &action.limiting);
-    if let Some(raised) = action.not_finite.or(saturation) {
-        state.supervisor.raise(raised);
-        state.latch = None;
-        action = Action::none();
-    }
-    state.torques_nm = action.torques_nm;
-
-    let joint_count = params.hand.joint_count();
-    let record = Record {
-        sequence: state.ticks,
-        tick: state.ticks,
-        mode: state.supervisor.mode(),
-        fault: state.supervisor.fault(),
-        answer,
-        force_n: action.force_n,
-        attitude_stiffness_nm: action.attitude_stiffness_nm,
-        approach_potential_j: action.monitor.approach_potential_j,
-        attitude_potential_j: action.monitor.attitude_potential_j,
-        counts,
-        torques_nm: List::first_of(action.torques_nm, joint_count),
-        limiting: List::first_of(action.limiting, joint_count),
-    };
-    state.ticks = state.ticks.wrapping_add(1);
-    Output { torques_nm: action.torques_nm, record }
 }
 
 /// The law and the limits, as the mode wants them.
@@ -278,7 +427,7 @@ fn act<T: Real, const J: usize, const F: usize>(
     params: &Params<T, J, F>,
     state: &mut State<T, J, F>,
 ) -> Action<T, J> {
-    let drive = state.supervisor.drive(&params.ramps);
+    let drive = state.supervisor.drive(&params.prepared.ramps);
     if !matches!(drive, Drive::Grip { .. }) {
         state.latch = None;
     }
@@ -290,22 +439,21 @@ fn act<T: Real, const J: usize, const F: usize>(
     let posture = &state.posture;
     let grip = match drive {
         Drive::Off | Drive::Hold => None,
-        Drive::Grip { force_share, attitude_share } => {
-            let latch = &*state.latch.get_or_insert_with(|| Latch::of(posture));
-            Some(Grip { latch, force_share, attitude_share })
-        }
+        Drive::Grip { force_share, attitude_share } => Some(Grip {
+            latch: &*state.latch.get_or_insert_with(|| Latch::of(posture)),
+            force_n: state.grasp.force_n * force_share,
+            attitude_stiffness_nm: state.grasp.attitude_stiffness_nm * attitude_share,
+        }),
     };
-    let (wanted_nm, monitor) = params.law.torques(&params.hand, posture, speeds_rad_s, grip);
-    let (torques_nm, limiting) = params.limits.apply(angles_rad, speeds_rad_s, &state.torques_nm, &wanted_nm);
+    let (wanted_nm, monitor) = params.prepared.law.torques(&params.hand, posture, speeds_rad_s, grip);
+    let (torques_nm, limiting) =
+        params.prepared.limits.apply(angles_rad, speeds_rad_s, &state.torques_nm, &wanted_nm);
     // A limit makes an infinite torque finite: both sides of it are looked at.
-    let not_finite = params.watch.torques(&wanted_nm).or(params.watch.torques(&torques_nm));
-    Action {
-        torques_nm,
-        limiting,
-        not_finite,
-        force_n: grip.map_or(T::zero(), |grip| params.force_n * grip.force_share),
-        attitude_stiffness_nm: grip
-            .map_or(T::zero(), |grip| params.law.attitude_stiffness_nm() * grip.attitude_share),
-        monitor,
-    }
+    let not_finite = params.prepared.watch.torques(&wanted_nm).or(params.prepared.watch.torques(&torques_nm));
+    let none = Firmness { force_n: T::zero(), attitude_stiffness_nm: T::zero() };
+    let grip = grip.map_or(none, |grip| Firmness {
+        force_n: grip.force_n,
+        attitude_stiffness_nm: grip.attitude_stiffness_nm,
+    });
+    Action { torques_nm, limiting, not_finite, grip, monitor }
 }

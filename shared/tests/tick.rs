@@ -2,29 +2,37 @@
 
 mod common;
 
-use blindgrasp_shared::command::{Answer, Command, Refusal};
+use blindgrasp_shared::command::{Answer, Command, Grasp, Refusal};
+use blindgrasp_shared::event::{Event, Events};
 use blindgrasp_shared::fault::{Fault, FaultConfig, Raised};
 use blindgrasp_shared::limit::{Limit, LimitConfig};
 use blindgrasp_shared::supervisor::{Mode, SupervisorConfig};
 use blindgrasp_shared::telemetry::Record;
-use blindgrasp_shared::tick::{Config, Output, Params, State, tick, tick_blind, tick_with};
+use blindgrasp_shared::tick::{Config, Input, Output, Params, State, tick};
 use common::{JOINTS, SLEW_NM_S, TORQUE_NM, config, facing_counts, facing_rad, params};
 use proptest::prelude::*;
 
 type TestParams = Params<f32, 12, 3>;
 type TestState = State<f32, 12, 3>;
 
+const GRASP: Command = Command::Grasp(Grasp::CONFIGURED);
+
+/// A joint could not be read.
+fn missing(joint: usize) -> Input<'static, f32, 12> {
+    Input::failed(Raised::at(joint, Fault::SampleMissing), None)
+}
+
 /// Ticks at the facing posture with one command each, then without; returns the last.
 fn drive(params: &TestParams, state: &mut TestState, commands: &[Command], ticks: usize) -> Output<f32, 12> {
     let counts = facing_counts();
     for &command in commands {
-        let output = tick(params, state, &counts, Some(command));
+        let output = tick(params, state, &Input::counts(&counts, Some(command)));
         assert_eq!(output.record.answer, Some(Answer { command, refused: None }));
     }
     for _ in 1..ticks {
-        tick(params, state, &counts, None);
+        tick(params, state, &Input::counts(&counts, None));
     }
-    tick(params, state, &counts, None)
+    tick(params, state, &Input::counts(&counts, None))
 }
 
 /// A state that was led into a mode.
@@ -33,12 +41,14 @@ fn in_mode(params: &TestParams, mode: Mode) -> TestState {
     let commands: &[Command] = match mode {
         Mode::Disarmed | Mode::Fault => &[],
         Mode::Armed => &[Command::Arm],
-        Mode::Grasping | Mode::Releasing => &[Command::Arm, Command::Grasp],
+        Mode::Grasping | Mode::Releasing => &[Command::Arm, GRASP],
     };
     drive(params, &mut state, commands, 50);
     match mode {
-        Mode::Releasing => drop(tick(params, &mut state, &facing_counts(), Some(Command::Release))),
-        Mode::Fault => drop(tick_blind(params, &mut state, 0, None)),
+        Mode::Releasing => {
+            drop(tick(params, &mut state, &Input::counts(&facing_counts(), Some(Command::Release))))
+        }
+        Mode::Fault => drop(tick(params, &mut state, &missing(0))),
         _ => {}
     }
     assert_eq!(state.mode(), mode);
@@ -54,7 +64,7 @@ fn each_mode_drives_as_it_should() {
     let params = params(&config());
     for mode in Mode::ALL {
         let mut state = in_mode(&params, mode);
-        let output = tick(&params, &mut state, &facing_counts(), None);
+        let output = tick(&params, &mut state, &Input::counts(&facing_counts(), None));
         let torque = !matches!(mode, Mode::Disarmed | Mode::Fault);
         assert_eq!(has_torque(&output), torque, "{mode:?}");
         let grip = matches!(mode, Mode::Grasping | Mode::Releasing);
@@ -70,7 +80,7 @@ fn stop_takes_the_torque_away_within_one_tick_in_every_mode() {
     let params = params(&config());
     for mode in Mode::ALL {
         let mut state = in_mode(&params, mode);
-        let output = tick(&params, &mut state, &facing_counts(), Some(Command::Stop));
+        let output = tick(&params, &mut state, &Input::counts(&facing_counts(), Some(Command::Stop)));
         assert_eq!(output.torques_nm, [0.0; 12], "{mode:?}");
         assert_eq!(output.record.answer, Some(Answer { command: Command::Stop, refused: None }));
         let next = if mode == Mode::Fault { Mode::Fault } else { Mode::Disarmed };
@@ -83,10 +93,10 @@ fn a_fault_takes_the_torque_away_within_one_tick_in_every_mode() {
     let params = params(&config());
     for mode in Mode::ALL {
         let mut state = in_mode(&params, mode);
-        let output = tick_blind(&params, &mut state, 5, None);
+        let output = tick(&params, &mut state, &missing(5));
         assert_eq!((output.record.mode, output.torques_nm), (Mode::Fault, [0.0; 12]), "{mode:?}");
         assert!(state.latch().is_none());
-        let output = tick(&params, &mut state, &facing_counts(), Some(Command::ClearFault));
+        let output = tick(&params, &mut state, &Input::counts(&facing_counts(), Some(Command::ClearFault)));
         assert_eq!((output.record.mode, output.torques_nm), (Mode::Disarmed, [0.0; 12]));
         assert_eq!(output.record.fault, None);
     }
@@ -96,14 +106,14 @@ fn a_fault_takes_the_torque_away_within_one_tick_in_every_mode() {
 fn attitudes_are_latched_at_the_first_grasping_tick_and_anew_for_each_grasp() {
     let params = params(&config());
     let mut state = in_mode(&params, Mode::Armed);
-    let record = tick(&params, &mut state, &facing_counts(), Some(Command::Grasp)).record;
+    let record = tick(&params, &mut state, &Input::counts(&facing_counts(), Some(GRASP))).record;
     assert!(record.attitude_potential_j.abs() < 1e-7, "{}", record.attitude_potential_j);
     let first = *state.latch().unwrap();
     let mut turned = facing_counts();
     let mut record = record;
     for _ in 0..50 {
         turned[3] += 20;
-        record = tick(&params, &mut state, &turned, None).record;
+        record = tick(&params, &mut state, &Input::counts(&turned, None)).record;
     }
     // 1,000 counts are 0.29 rad: 2 K_st (1 - cos a) for each of the fingertip's two neighbours, in a ring of three.
     let expected = 2.0 * 2.0 * 5e-3 * (1.0 - 0.958_0);
@@ -112,11 +122,11 @@ fn attitudes_are_latched_at_the_first_grasping_tick_and_anew_for_each_grasp() {
         "{}",
         record.attitude_potential_j
     );
-    let record = tick(&params, &mut state, &turned, Some(Command::Grasp)).record;
+    let record = tick(&params, &mut state, &Input::counts(&turned, Some(GRASP))).record;
     assert!(record.attitude_potential_j > 0.0, "a repeated command must not latch anew");
     assert_eq!(state.latch(), Some(&first));
-    for command in [Command::Stop, Command::Arm, Command::Grasp] {
-        tick(&params, &mut state, &turned, Some(command));
+    for command in [Command::Stop, Command::Arm, GRASP] {
+        tick(&params, &mut state, &Input::counts(&turned, Some(command)));
     }
     assert_ne!(state.latch(), Some(&first));
 }
@@ -126,24 +136,24 @@ fn force_grows_over_the_soft_start_and_falls_over_the_release() {
     let params = params(&config());
     let mut state = in_mode(&params, Mode::Armed);
     let counts = facing_counts();
-    let mut last = tick(&params, &mut state, &counts, Some(Command::Grasp)).record;
+    let mut last = tick(&params, &mut state, &Input::counts(&counts, Some(GRASP))).record;
     assert_eq!(last.force_n, 5.0 * (1.0_f32 / 100.0));
     for _ in 1..100 {
-        let record = tick(&params, &mut state, &counts, None).record;
+        let record = tick(&params, &mut state, &Input::counts(&counts, None)).record;
         assert!(record.force_n > last.force_n);
         assert_eq!(record.attitude_stiffness_nm, 5e-3);
         last = record;
     }
     assert_eq!(last.force_n, 5.0);
-    let mut last = tick(&params, &mut state, &counts, Some(Command::Release)).record;
+    let mut last = tick(&params, &mut state, &Input::counts(&counts, Some(Command::Release))).record;
     for _ in 1..100 {
-        let record = tick(&params, &mut state, &counts, None).record;
+        let record = tick(&params, &mut state, &Input::counts(&counts, None)).record;
         assert!(record.force_n < last.force_n && record.attitude_stiffness_nm < last.attitude_stiffness_nm);
         assert_eq!(record.mode, Mode::Releasing);
         last = record;
     }
     assert_eq!((last.force_n, last.attitude_stiffness_nm), (0.0, 0.0));
-    let record = tick(&params, &mut state, &counts, None).record;
+    let record = tick(&params, &mut state, &Input::counts(&counts, None)).record;
     assert_eq!((record.mode, state.latch()), (Mode::Armed, None));
 }
 
@@ -151,8 +161,8 @@ fn force_grows_over_the_soft_start_and_falls_over_the_release() {
 fn refused_commands_are_answered_with_the_reason() {
     let params: TestParams = params(&config());
     let mut state = TestState::new();
-    let record = tick(&params, &mut state, &facing_counts(), Some(Command::Grasp)).record;
-    let answer = Answer { command: Command::Grasp, refused: Some(Refusal::NotArmed) };
+    let record = tick(&params, &mut state, &Input::counts(&facing_counts(), Some(GRASP))).record;
+    let answer = Answer { command: GRASP, refused: Some(Refusal::NotArmed) };
     assert_eq!((record.answer, record.mode), (Some(answer), Mode::Disarmed));
 }
 
@@ -164,7 +174,7 @@ fn each_limit_shows_in_the_record() {
     let params = params(&config);
     let mut state = in_mode(&params, Mode::Armed);
     let seen = |output: &Output<f32, 12>, limit| output.record.limiting.iter().any(|l| l.contains(limit));
-    let output = tick(&params, &mut state, &facing_counts(), Some(Command::Grasp));
+    let output = tick(&params, &mut state, &Input::counts(&facing_counts(), Some(GRASP)));
     assert!(seen(&output, Limit::Slew));
     let output = drive(&params, &mut state, &[], 50);
     assert!(seen(&output, Limit::Torque) && !seen(&output, Limit::LowerStop));
@@ -172,8 +182,8 @@ fn each_limit_shows_in_the_record() {
         let mut state = TestState::new();
         let mut counts = facing_counts();
         counts[0] = sign * 6_600; // 1.92 rad of 2
-        tick(&params, &mut state, &counts, Some(Command::Arm));
-        let output = tick(&params, &mut state, &counts, None);
+        tick(&params, &mut state, &Input::counts(&counts, Some(Command::Arm)));
+        let output = tick(&params, &mut state, &Input::counts(&counts, None));
         assert!(output.record.limiting.as_slice()[0].contains(limit));
         assert!(!output.record.limiting.as_slice()[4].contains(limit));
     }
@@ -190,11 +200,11 @@ fn faulted(output: &Output<f32, 12>, joint: usize, fault: Fault) {
 fn a_missing_sample_is_a_fault() {
     let params = params(&config());
     let mut state = in_mode(&params, Mode::Grasping);
-    faulted(&tick_blind(&params, &mut state, 5, None), 5, Fault::SampleMissing);
+    faulted(&tick(&params, &mut state, &missing(5)), 5, Fault::SampleMissing);
     // The estimator starts anew: where the joint is by then is no jump.
     let mut counts = facing_counts();
     counts[5] += 2_000;
-    let record = tick(&params, &mut state, &counts, Some(Command::ClearFault)).record;
+    let record = tick(&params, &mut state, &Input::counts(&counts, Some(Command::ClearFault))).record;
     assert_eq!(record.mode, Mode::Disarmed);
 }
 
@@ -206,7 +216,7 @@ fn an_impossible_count_is_a_fault() {
         let mut state = in_mode(&params, Mode::Grasping);
         let mut counts = facing_counts();
         counts[3] += jump;
-        faulted(&tick(&params, &mut state, &counts, None), 3, fault);
+        faulted(&tick(&params, &mut state, &Input::counts(&counts, None)), 3, fault);
     }
 }
 
@@ -216,8 +226,8 @@ fn a_joint_beyond_its_range_is_a_fault_that_persists() {
     let mut state = TestState::new();
     let mut counts = facing_counts();
     counts[10] = 7_100; // 2.065 rad; the range ends at 2, the slack at 2.05
-    faulted(&tick(&params, &mut state, &counts, None), 10, Fault::BeyondRange);
-    let output = tick(&params, &mut state, &counts, Some(Command::ClearFault));
+    faulted(&tick(&params, &mut state, &Input::counts(&counts, None)), 10, Fault::BeyondRange);
+    let output = tick(&params, &mut state, &Input::counts(&counts, Some(Command::ClearFault)));
     faulted(&output, 10, Fault::BeyondRange);
     assert_eq!(output.record.answer.unwrap().refused, Some(Refusal::FaultPersists));
 }
@@ -230,7 +240,7 @@ fn a_joint_that_turns_too_fast_is_a_fault() {
     // 22 rad/s; the limit is 20. The filter needs some ticks to be sure.
     let found = (0..20).position(|_| {
         counts[6] -= 76;
-        tick(&params, &mut state, &counts, None).record.mode == Mode::Fault
+        tick(&params, &mut state, &Input::counts(&counts, None)).record.mode == Mode::Fault
     });
     assert!(found.is_some_and(|ticks| ticks <= 8), "{found:?}");
     assert_eq!(state.fault(), Some(Raised::at(6, Fault::Overspeed)));
@@ -244,7 +254,7 @@ fn a_torque_at_its_limit_for_too_long_is_a_fault() {
     config.limits.slew_nm_s = None;
     let params = params(&config);
     let mut state = in_mode(&params, Mode::Armed);
-    tick(&params, &mut state, &facing_counts(), Some(Command::Grasp));
+    tick(&params, &mut state, &Input::counts(&facing_counts(), Some(GRASP)));
     let record = drive(&params, &mut state, &[], 199).record;
     assert_eq!(record.mode, Mode::Grasping);
     let output = drive(&params, &mut state, &[], 1);
@@ -265,13 +275,13 @@ fn what_is_not_finite_is_a_fault_and_never_a_torque() {
                 let (mut angles, mut speeds) = (facing_rad(), [0.0; 12]);
                 angles[8] += bad_angle;
                 speeds[8] += bad_speed;
-                let output = tick_with(&params, &mut state, &angles, &speeds, None);
+                let output = tick(&params, &mut state, &Input::ideal(&angles, &speeds, None));
                 faulted(&output, 8, Fault::NotFinite);
-                let output =
-                    tick_with(&params, &mut state, &facing_rad(), &[0.0; 12], Some(Command::ClearFault));
+                let (angles, clear) = (facing_rad(), Some(Command::ClearFault));
+                let output = tick(&params, &mut state, &Input::ideal(&angles, &[0.0; 12], clear));
                 assert_eq!(output.record.mode, Mode::Disarmed);
                 assert!(
-                    drive(&params, &mut state, &[Command::Arm, Command::Grasp], 9)
+                    drive(&params, &mut state, &[Command::Arm, GRASP], 9)
                         .torques_nm
                         .iter()
                         .all(|t| t.is_finite())
@@ -289,7 +299,7 @@ fn gains_that_overflow_are_a_fault_even_behind_a_torque_limit() {
     let mut state = in_mode(&params, Mode::Armed);
     let mut speeds = [0.0; 12];
     speeds[4] = 10.0;
-    let output = tick_with(&params, &mut state, &facing_rad(), &speeds, None);
+    let output = tick(&params, &mut state, &Input::ideal(&facing_rad(), &speeds, None));
     faulted(&output, 4, Fault::NotFinite);
 }
 
@@ -302,13 +312,13 @@ fn ideal_sensors_and_encoders_differ_by_the_estimator_alone() {
         counts[k % JOINTS] += (k % 5) as i32 - 2;
         let command = match k {
             5 => Some(Command::Arm),
-            20 => Some(Command::Grasp),
+            20 => Some(GRASP),
             400 => Some(Command::Release),
             _ => None,
         };
-        let one = tick(&params, &mut with_counts, &counts, command);
+        let one = tick(&params, &mut with_counts, &Input::counts(&counts, command));
         let (angles, speeds) = (*with_counts.angles_rad(), *with_counts.speeds_rad_s());
-        let other = tick_with(&params, &mut with_angles, &angles, &speeds, command);
+        let other = tick(&params, &mut with_angles, &Input::ideal(&angles, &speeds, command));
         assert_eq!(one.torques_nm, other.torques_nm);
         assert_eq!(other.record.counts.as_slice(), &[]);
         assert_eq!(Record { counts: one.record.counts, ..other.record }, one.record);
@@ -321,7 +331,7 @@ fn records_are_numbered() {
     let params = params(&config());
     let mut state = TestState::new();
     for k in 0..10 {
-        let record = tick(&params, &mut state, &facing_counts(), None).record;
+        let record = tick(&params, &mut state, &Input::counts(&facing_counts(), None)).record;
         assert_eq!((record.sequence, record.tick), (k, k));
         assert_eq!(record.counts.as_slice(), &facing_counts::<12>());
     }
@@ -363,6 +373,128 @@ fn parameters_out_of_range_are_named_with_their_joint() {
     assert_eq!(told, "supervisor.release_ms has to be at most an hour (3600000)");
 }
 
+#[test]
+fn a_frozen_counter_is_a_fault_once_torque_and_neighbours_change() {
+    let params: TestParams = params(&config());
+    let mut state = in_mode(&params, Mode::Armed);
+    tick(&params, &mut state, &Input::counts(&facing_counts(), Some(GRASP)));
+    let mut counts = facing_counts();
+    let found = (0..500).find(|&k| {
+        // All joints turn, but one tells nothing of it. At rest between, none does.
+        for (_, count) in counts.iter_mut().enumerate().filter(|&(joint, _)| joint != 9 && k > 200) {
+            *count += 1;
+        }
+        tick(&params, &mut state, &Input::counts(&counts, None)).record.mode == Mode::Fault
+    });
+    assert_eq!(state.fault(), Some(Raised::at(9, Fault::CounterFrozen)));
+    // 0.03 rad are 103 counts.
+    assert!(found.is_some_and(|tick| (304..330).contains(&tick)), "{found:?}");
+}
+
+#[test]
+fn a_heartbeat_that_stops_lets_go_and_arming_needs_one() {
+    let mut config = config();
+    config.faults.heartbeat_ms = Some(50);
+    let params: TestParams = params(&config);
+    let mut state = TestState::new();
+    let counts = facing_counts();
+    let mut step = |command, alive| {
+        let events = Events::NONE.with(Event::Heartbeat, alive);
+        tick(&params, &mut state, &Input::counts(&counts, command).with(events)).record
+    };
+    let refused = step(Some(Command::Arm), false).answer.and_then(|answer| answer.refused);
+    assert_eq!(refused, Some(Refusal::NoHeartbeat));
+    for command in [Command::Arm, GRASP] {
+        assert_eq!(step(Some(command), true).answer, Some(Answer { command, refused: None }));
+    }
+    for k in 0..200 {
+        assert_eq!(step(None, k % 50 == 0).mode, Mode::Grasping);
+    }
+    // The last was in tick 150.
+    assert_eq!(step(None, false).mode, Mode::Grasping);
+    let record = step(None, false);
+    assert_eq!(record.mode, Mode::Releasing);
+    assert_eq!(record.fault, Some(Raised::of_hand(Fault::LinkLost)));
+    let mut last_n = 5.0;
+    for _ in 1..100 {
+        let record = step(None, false);
+        assert!(record.mode == Mode::Releasing && record.force_n < last_n);
+        last_n = record.force_n;
+    }
+    let record = step(None, false);
+    assert_eq!((record.mode, record.force_n), (Mode::Fault, 0.0));
+    assert_eq!(record.fault, Some(Raised::of_hand(Fault::LinkLost)));
+}
+
+#[test]
+fn late_ticks_are_a_fault_and_the_fall_back_clock_does_not_arm() {
+    let params: TestParams = params(&config());
+    let mut state = in_mode(&params, Mode::Armed);
+    let counts = facing_counts();
+    let late = Input::counts(&counts, None).with(Events::NONE.with(Event::Late, true));
+    for _ in 0..3 {
+        assert_eq!(tick(&params, &mut state, &late).record.mode, Mode::Armed);
+    }
+    let record = tick(&params, &mut state, &late).record;
+    assert_eq!(record.fault, Some(Raised::of_hand(Fault::TickLate)));
+    let mut state = TestState::new();
+    let events = Events::NONE.with(Event::FallbackClock, true);
+    let arm = Input::counts(&counts, Some(Command::Arm)).with(events);
+    let record = tick(&params, &mut state, &arm).record;
+    assert_eq!(record.answer.and_then(|answer| answer.refused), Some(Refusal::FallbackClock));
+    assert_eq!((record.mode, record.events), (Mode::Disarmed, events));
+}
+
+#[test]
+fn work_beyond_its_limit_is_a_fault() {
+    let mut config = config();
+    config.law.damping_nm_s = [0.0; 12];
+    config.faults.energy_j = Some(0.002);
+    let params: TestParams = params(&config);
+    let mut state = in_mode(&params, Mode::Armed);
+    let mut counts = facing_counts();
+    // A joint that goes where the torque pushes it, at 3 rad/s: like a weight that is not there.
+    let mut output = drive(&params, &mut state, &[], 1);
+    let mut lifted_j = 0.0;
+    while state.fault().is_none() {
+        counts[1] += if output.torques_nm[1] > 0.0 { 10 } else { -10 };
+        output = tick(&params, &mut state, &Input::counts(&counts, None));
+        lifted_j = output.record.energy_j;
+    }
+    assert_eq!(state.fault(), Some(Raised::of_hand(Fault::TooMuchEnergy)));
+    assert!(lifted_j > 0.002 && lifted_j < 0.0021, "{lifted_j}");
+}
+
+#[test]
+fn a_grasp_is_as_firm_as_asked_for_within_the_limits() {
+    let params: TestParams = params(&config());
+    let grasp = |force_n, attitude_stiffness_nm| Command::Grasp(Grasp { force_n, attitude_stiffness_nm });
+    let counts = facing_counts();
+    let mut state = in_mode(&params, Mode::Armed);
+    let refused = |state: &mut TestState, command| {
+        let record = tick(&params, state, &Input::counts(&counts, Some(command))).record;
+        record.answer.and_then(|answer| answer.refused)
+    };
+    for bad in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
+        assert_eq!(refused(&mut state, grasp(Some(bad), None)), Some(Refusal::NotFinite));
+        assert_eq!(refused(&mut state, grasp(None, Some(bad))), Some(Refusal::NotFinite));
+    }
+    for (force_n, stiffness_nm) in
+        [(Some(-0.1), None), (Some(500.1), None), (None, Some(0.11)), (None, Some(-1e-9))]
+    {
+        assert_eq!(refused(&mut state, grasp(force_n, stiffness_nm)), Some(Refusal::OutOfRange));
+    }
+    assert_eq!(state.mode(), Mode::Armed);
+    assert_eq!(refused(&mut state, grasp(Some(2.0), Some(0.01))), None);
+    let record = drive(&params, &mut state, &[], 100).record;
+    assert_eq!((record.force_n, record.attitude_stiffness_nm), (2.0, 0.01));
+    // The same again is done; another firmness would be a lie.
+    assert_eq!(refused(&mut state, grasp(Some(2.0), Some(0.01))), None);
+    assert_eq!(refused(&mut state, GRASP), Some(Refusal::Grasping));
+    let record = drive(&params, &mut state, &[], 1).record;
+    assert_eq!(record.force_n, 2.0);
+}
+
 /// The same value for all joints but one.
 fn with(all: f32, joint: usize, value: f32) -> [f32; 12] {
     let mut values = [all; 12];
@@ -402,7 +534,7 @@ proptest! {
             if let Some(absurd) = absurd {
                 counts[3] = absurd;
             }
-            let output = tick(&params, &mut state, &counts, command);
+            let output = tick(&params, &mut state, &Input::counts(&counts, command));
             let off = matches!(output.record.mode, Mode::Disarmed | Mode::Fault);
             for (torque, last) in output.torques_nm.into_iter().zip(last) {
                 prop_assert!(torque.abs() <= TORQUE_NM as f32);
@@ -427,7 +559,8 @@ proptest! {
             let config = Config { limits: LimitConfig::NONE, faults: FaultConfig::LEAST, ..config() };
             let params: TestParams = params(&config);
             let mut state = in_mode(&params, Mode::Grasping);
-            let output = tick_with(&params, &mut state, &angles.map(|a| a * scale), &speeds.map(|s| s * scale), None);
+            let (angles, speeds) = (angles.map(|a| a * scale), speeds.map(|s| s * scale));
+            let output = tick(&params, &mut state, &Input::ideal(&angles, &speeds, None));
             prop_assert!(output.torques_nm.iter().all(|torque| torque.is_finite()));
         }
     }

@@ -159,7 +159,7 @@ impl Grasp {
     }
 
     fn grip(&self) -> Grip<'_, f64, MAX_FINGERS> {
-        Grip { latch: &self.latch, force_share: 1.0, attitude_share: 1.0 }
+        self.law.grip(&self.latch)
     }
 
     /// The law's torques for the plant's motion, N m.

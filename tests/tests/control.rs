@@ -69,7 +69,11 @@ impl Case {
     /// Torques at some speeds, with shares of the force and of the attitudes' stiffness.
     fn torques(&self, speeds: &Torques, shares: (f64, f64)) -> Torques {
         let latch = self.latch();
-        let grip = Grip { latch: &latch, force_share: shares.0, attitude_share: shares.1 };
+        let grip = Grip {
+            latch: &latch,
+            force_n: self.law.force_n() * shares.0,
+            attitude_stiffness_nm: self.law.attitude_stiffness_nm() * shares.1,
+        };
         self.law.torques(&self.hand, &self.posture(&self.angles), speeds, Some(grip)).0
     }
 
@@ -170,7 +174,7 @@ fn the_approach_is_the_negative_gradient_of_its_potential() {
             errors.add((torques[k] + gradient[k] + case.damping[k] * case.speeds[k] - weight[k]) / scale);
         }
         let latch = case.latch();
-        let grip = Grip { latch: &latch, force_share: 1.0, attitude_share: 0.0 };
+        let grip = Grip { attitude_stiffness_nm: 0.0, ..case.law.grip(&latch) };
         let monitor = case.law.torques(&case.hand, &case.posture(&case.angles), &case.speeds, Some(grip)).1;
         let potential = case.approach_potential(&case.description.placed(&case.angles));
         potentials.add((monitor.approach_potential_j - potential) / case.approach_scale());
@@ -199,7 +203,7 @@ fn the_relative_attitudes_are_the_negative_gradient_of_their_potential() {
             errors.add((with[k] - without[k] + gradient[k]) / (2.0 * n * K_ST_NM));
         }
         let latch = case.latch();
-        let grip = Grip { latch: &latch, force_share: 1.0, attitude_share: 1.0 };
+        let grip = case.law.grip(&latch);
         let monitor = case.law.torques(&case.hand, &case.posture(&case.angles), &case.speeds, Some(grip)).1;
         // The law's has the constant that makes it zero at the latch.
         let expected =
@@ -368,7 +372,7 @@ fn nothing_pulls_at_the_attitudes_at_the_latch() {
         for wrench in case.law.attitude_wrenches(&case.hand, &posture, &latch) {
             moments.add(wrench.moment_nm.norm() / K_ST_NM);
         }
-        let grip = Grip { latch: &latch, force_share: 1.0, attitude_share: 1.0 };
+        let grip = case.law.grip(&latch);
         let monitor = case.law.torques(&case.hand, &posture, &case.speeds, Some(grip)).1;
         potentials.add(monitor.attitude_potential_j / K_ST_NM);
     }
@@ -387,7 +391,7 @@ fn normal_only_knows_no_latch() {
         let latches = [case.latch(), Latch::of(&posture)];
         let approach = case.torques(&case.speeds, (1.0, 0.0));
         for latch in &latches {
-            let grip = Grip { latch, force_share: 1.0, attitude_share: 1.0 };
+            let grip = normal_only.grip(latch);
             let (torques, monitor) = normal_only.torques(&case.hand, &posture, &case.speeds, Some(grip));
             assert_eq!(torques, approach);
             assert_eq!(monitor.attitude_potential_j, 0.0);
@@ -395,12 +399,8 @@ fn normal_only_knows_no_latch() {
         let weight = case.hand.gravity_torques(&posture, &case.gravity);
         let pulls = case.hand.fingertip_torques(&posture, &case.law.approach_wrenches(&case.hand, &posture));
         let expected: [f64; JOINTS] = std::array::from_fn(|k| pulls[k] + weight[k]);
-        let still = normal_only.torques(
-            &case.hand,
-            &posture,
-            &[0.0; JOINTS],
-            Some(Grip { latch: &latches[0], force_share: 1.0, attitude_share: 1.0 }),
-        );
+        let still =
+            normal_only.torques(&case.hand, &posture, &[0.0; JOINTS], Some(normal_only.grip(&latches[0])));
         assert_eq!(still.0, expected);
         let released = case.law.torques(&case.hand, &posture, &[0.0; JOINTS], None).0;
         assert_eq!(released, weight);

@@ -7,7 +7,7 @@ fn main() {}
 
 #[cfg(target_os = "none")]
 mod on_target {
-    use blindgrasp_firmware::{CONFIG, FINGERS, HAND, JOINTS};
+    use blindgrasp_firmware::model::{CONFIG, FINGERS, HAND, JOINTS};
     use blindgrasp_shared::tick::Params;
     use core::hint::black_box;
 

@@ -4,7 +4,7 @@
 fn main() {}
 #[cfg(target_os = "none")]
 mod on_target {
-    use blindgrasp_firmware::{CONFIG, HAND};
+    use blindgrasp_firmware::model::{CONFIG, HAND};
     use core::hint::black_box;
     #[panic_handler]
     fn panic(_: &core::panic::PanicInfo<'_>) -> ! {

@@ -4,7 +4,7 @@ use super::file::{Actuators, Control, JointFile, Sensors};
 use crate::MAX_JOINTS;
 use blindgrasp_shared::control::GraspConfig;
 use blindgrasp_shared::estimate::{Encoder, EstimatorConfig};
-use blindgrasp_shared::fault::FaultConfig;
+use blindgrasp_shared::fault::{FaultConfig, FrozenConfig};
 use blindgrasp_shared::limit::{LimitConfig, StopConfig};
 use blindgrasp_shared::math::Real;
 use blindgrasp_shared::supervisor::SupervisorConfig;
@@ -22,6 +22,17 @@ const RANGE_SLACK_RAD: f64 = 0.1;
 const IMPOSSIBLE_SPEED: f64 = 1.5;
 /// How long a torque may stay at its limit, ms.
 const SATURATED_MS: u32 = 1000;
+/// How many times as firmly as configured a user may grasp.
+const FIRMEST: f64 = 4.0;
+/// A counter that stands still is not believed for longer than this, ms, ...
+const FROZEN_MS: u32 = 50;
+/// ... once the torque changed by this share of its limit ...
+const FROZEN_SHARE: f64 = 0.02;
+/// ... and a neighbour turned by this, rad. In grasps of the prism and the cube, with up to three times the friction and
+/// twice the force, neighbours of joints that really stood still turned by 0.011 rad at most.
+const FROZEN_NEIGHBOUR_RAD: f64 = 0.03;
+/// The work of a second is at most that of all torque limits over this angle, rad.
+const ENERGY_TRAVEL_RAD: f64 = 0.1;
 /// How long letting go takes, ms.
 const RELEASE_MS: u32 = 300;
 
@@ -55,7 +66,7 @@ impl Setup<'_> {
             stiffness_nm_rad: self.each(|joint| STOP_SHARE * joint.torque_limit_nm / stop_margin_rad(joint)),
             damping_nm_s: self.each(|joint| 10.0 * self.damping_nm_s(joint)),
         });
-        let watched = !sensors.ideal;
+        let (watched, limited) = (!sensors.ideal, actuators.torque_limits);
         Config {
             period_us: (control.period_s * 1e6).round() as u32,
             estimator: EstimatorConfig {
@@ -70,7 +81,9 @@ impl Setup<'_> {
             },
             law: self.law(),
             limits: LimitConfig {
-                torque_nm: actuators.torque_limits.then(|| self.each(|joint| joint.torque_limit_nm)),
+                force_n: limited.then_some((FIRMEST * control.force_n) as f32),
+                attitude_stiffness_nm: limited.then_some((FIRMEST * control.attitude_stiffness_nm) as f32),
+                torque_nm: limited.then(|| self.each(|joint| joint.torque_limit_nm)),
                 slew_nm_s: actuators.slew_limit_nm_s.map(|limit| self.each(|_| limit)),
                 stops,
             },
@@ -79,7 +92,18 @@ impl Setup<'_> {
                     .then(|| self.each(|joint| IMPOSSIBLE_SPEED * joint.speed_limit_rad_s)),
                 speed_limit_rad_s: watched.then(|| self.each(|joint| joint.speed_limit_rad_s)),
                 range_slack_rad: control.end_stops.then_some(RANGE_SLACK_RAD as f32),
-                saturated_ms: actuators.torque_limits.then_some(SATURATED_MS),
+                saturated_ms: limited.then_some(SATURATED_MS),
+                frozen: (watched && limited).then(|| FrozenConfig {
+                    torque_nm: self.each(|joint| FROZEN_SHARE * joint.torque_limit_nm),
+                    neighbour_rad: FROZEN_NEIGHBOUR_RAD as f32,
+                    after_ms: FROZEN_MS,
+                }),
+                heartbeat_ms: None,
+                late_ticks: None,
+                energy_j: limited.then(|| {
+                    let torques: f64 = self.joints.iter().map(|joint| joint.torque_limit_nm).sum();
+                    (ENERGY_TRAVEL_RAD * torques) as f32
+                }),
             },
             supervisor: SupervisorConfig {
                 soft_start_ms: (control.soft_start_s * 1e3).round() as u32,

@@ -9,14 +9,19 @@ use super::{
     hand::hand,
     library::{Document, Kind, complete_hand},
     read::read,
-    source::{IMPORTS, Source},
+    source::{IMPORTS, Source, config_source},
 };
 use crate::{Hand, MAX_JOINTS};
 use blindgrasp_shared::tick::{Config, Params};
 use std::path::Path;
 
-/// A hand, checked, with the configuration that its file asks for: encoders, torque limits, soft end stops as in
-/// `[control]`, and gravity along `-z` of its base, which is a palm that looks up.
+/// How long the host's heartbeat may fail while the hand has torque, ms.
+const HEARTBEAT_MS: u32 = 250;
+/// How many ticks in a row may be late.
+const LATE_TICKS: u32 = 3;
+
+/// A hand, checked, with the configuration that its file asks for: the gains of `[control]`, and all limits and faults that
+/// a real hand has. Gravity is along `-z` of the base: the palm looks up.
 #[derive(Clone, Debug, PartialEq)]
 pub struct HandModel {
     /// Its name.
@@ -79,7 +84,9 @@ impl HandModel {
             actuators: &Actuators::default(),
             gravity_m_s2: PlantSettings::default().gravity_m_s2,
         };
-        let config = setup.config();
+        let mut config = setup.config();
+        config.faults.heartbeat_ms = Some(HEARTBEAT_MS);
+        config.faults.late_ticks = Some(LATE_TICKS);
         // What is in range in f64 may not be in f32.
         if let Err(error) = Params::new(hand.cast::<f32>(), &config) {
             return fail("control", format!("the controller refuses it: {error}"), "");
@@ -112,7 +119,7 @@ pub static CONFIG: Config<f32, JOINTS> = {};
             self.name,
             joints.source(count),
             fingertips.source(count),
-            self.config.source(count),
+            config_source(&self.config, count),
         )
     }
 }

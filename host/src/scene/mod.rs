@@ -41,6 +41,7 @@ use tree::{Node, Setting};
 pub use error::{Place, SceneError};
 pub use file::{Actuators, Control, Friction, HandFile, ObjectFile, PlantSettings, SceneFile, Sensors};
 pub use hand_model::HandModel;
+pub use source::config_source;
 
 /// A scene, checked and ready for the simulator.
 #[derive(Clone, Debug, PartialEq)]

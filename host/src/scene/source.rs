@@ -4,7 +4,7 @@
 
 use blindgrasp_shared::control::GraspConfig;
 use blindgrasp_shared::estimate::{Encoder, EstimatorConfig};
-use blindgrasp_shared::fault::FaultConfig;
+use blindgrasp_shared::fault::{FaultConfig, FrozenConfig};
 use blindgrasp_shared::hand::{Fingertip, Link, PreparedJoint};
 use blindgrasp_shared::limit::{LimitConfig, StopConfig};
 use blindgrasp_shared::supervisor::SupervisorConfig;
@@ -15,13 +15,18 @@ use nalgebra::{Matrix3, Vector3};
 pub(super) const IMPORTS: &str = "\
 use blindgrasp_shared::control::GraspConfig;
 use blindgrasp_shared::estimate::{Encoder, EstimatorConfig};
-use blindgrasp_shared::fault::FaultConfig;
+use blindgrasp_shared::fault::{FaultConfig, FrozenConfig};
 use blindgrasp_shared::hand::{Fingertip, Hand, Link, PreparedJoint};
 use blindgrasp_shared::limit::{LimitConfig, StopConfig};
 use blindgrasp_shared::supervisor::SupervisorConfig;
 use blindgrasp_shared::tick::Config;
 use nalgebra::{Matrix3, Vector3};
 ";
+
+/// A configuration as a constant expression, for a hand of so many joints. What differs in a bit differs in a digit.
+pub fn config_source<const J: usize>(config: &Config<f32, J>, joints: usize) -> String {
+    config.source(joints.min(J))
+}
 
 /// A value that can be written as a constant expression.
 pub(super) trait Source {
@@ -112,9 +117,12 @@ structs! {
         force_n attitude_stiffness_nm damping_nm_s gravity_m_s2
     }
     impl [const J: usize] StopConfig<f32, J> as StopConfig { margin_rad stiffness_nm_rad damping_nm_s }
-    impl [const J: usize] LimitConfig<f32, J> as LimitConfig { torque_nm slew_nm_s stops }
+    impl [const J: usize] LimitConfig<f32, J> as LimitConfig {
+        force_n attitude_stiffness_nm torque_nm slew_nm_s stops
+    }
+    impl [const J: usize] FrozenConfig<f32, J> as FrozenConfig { torque_nm neighbour_rad after_ms }
     impl [const J: usize] FaultConfig<f32, J> as FaultConfig {
-        possible_speed_rad_s speed_limit_rad_s range_slack_rad saturated_ms
+        possible_speed_rad_s speed_limit_rad_s range_slack_rad saturated_ms frozen heartbeat_ms late_ticks energy_j
     }
     impl [] SupervisorConfig as SupervisorConfig { soft_start_ms release_ms }
     impl [const J: usize] Config<f32, J> as Config { period_us estimator law limits faults supervisor }

@@ -3,9 +3,9 @@
 use crate::plant::dynamics::JointVector;
 use crate::scene::Scene;
 use crate::{MAX_FINGERS, MAX_JOINTS};
-use blindgrasp_shared::command::Command;
+use blindgrasp_shared::command::{Command, Grasp};
 use blindgrasp_shared::parameter::ParameterError;
-use blindgrasp_shared::tick::{Output, Params, State, tick, tick_with};
+use blindgrasp_shared::tick::{Input, Output, Params, State, tick};
 use std::f64::consts::TAU;
 
 /// Encoders and the tick.
@@ -50,7 +50,7 @@ impl Controller {
 
     /// One tick; the first is told to grasp.
     pub(super) fn tick(&mut self, angles_rad: &JointVector, speeds_rad_s: &JointVector) {
-        let command = if self.started { None } else { Some(Command::Grasp) };
+        let command = if self.started { None } else { Some(Command::Grasp(Grasp::CONFIGURED)) };
         self.started = true;
         self.step(angles_rad, speeds_rad_s, command);
     }
@@ -58,10 +58,10 @@ impl Controller {
     fn step(&mut self, angles_rad: &JointVector, speeds_rad_s: &JointVector, command: Option<Command>) {
         let output = if self.ideal {
             let (angles, speeds) = (angles_rad.map(|v| v as f32), speeds_rad_s.map(|v| v as f32));
-            tick_with(&self.params, &mut self.state, &angles, &speeds, command)
+            tick(&self.params, &mut self.state, &Input::ideal(&angles, &speeds, command))
         } else {
             let counts = self.read_encoders(angles_rad);
-            tick(&self.params, &mut self.state, &counts, command)
+            tick(&self.params, &mut self.state, &Input::counts(&counts, command))
         };
         self.output = Some(output);
     }
@@ -106,7 +106,8 @@ impl Controller {
     /// The fault that the hand is in, in words.
     pub(super) fn fault(&self) -> Option<String> {
         let raised = self.state.fault()?;
-        let joint = self.joint_names.get(usize::from(raised.joint)).map_or("?", String::as_str);
-        Some(format!("fault {}: joint `{joint}`: {}", raised.fault.number(), raised.fault.words()))
+        let joint = raised.joint.and_then(|joint| self.joint_names.get(usize::from(joint)));
+        let joint = joint.map_or(String::new(), |name| format!("joint `{name}`: "));
+        Some(format!("fault {}: {joint}{}", raised.fault.number(), raised.fault.words()))
     }
 }

@@ -9,7 +9,7 @@
 use crate::plant::Plant;
 use crate::record::sample::{ContactSample, Sample};
 use crate::{Hand, MAX_FINGERS, MAX_JOINTS, Posture};
-use blindgrasp_shared::control::{GraspLaw, Grip, Latch};
+use blindgrasp_shared::control::{GraspLaw, Latch};
 use nalgebra::Vector3;
 
 /// The law as it would be with perfect sensors, in the precision of the plant: what the run is compared with.
@@ -42,7 +42,7 @@ impl Observer {
 
     /// Energy `E = K + V + sum(P_i)` (Eq. 40), J: of the whole law, also while its force is still growing.
     pub fn energy_j(&self, plant: &Plant) -> f64 {
-        let grip = Grip { latch: &self.latch, force_share: 1.0, attitude_share: 1.0 };
+        let grip = self.law.grip(&self.latch);
         let speeds = &plant.motion().speeds_rad_s;
         let (_, monitor) = self.law.torques(&plant.model().hand, plant.posture(), speeds, Some(grip));
         plant.kinetic_energy_j()

@@ -62,7 +62,8 @@ impl<T: Real, const J: usize> GraspConfig<T, J> {
         }
         let radii = (0..hand.fingertip_count()).fold(T::zero(), |sum, i| sum + hand.radius_m(i));
         Ok(GraspLaw {
-            approach_stiffness_n_m: self.force_n / radii,
+            force_n: self.force_n,
+            per_radii_1_m: T::one() / radii,
             attitude_stiffness_nm: self.attitude_stiffness_nm,
             damping_nm_s: self.damping_nm_s,
             gravity_m_s2: self.gravity_m_s2,
@@ -89,10 +90,10 @@ impl<T: Real, const F: usize> Latch<T, F> {
 pub struct Grip<'a, T, const F: usize> {
     /// Attitudes to hold.
     pub latch: &'a Latch<T, F>,
-    /// Share of `f_d`, from 0 to 1: the soft start, so that the fingers do not hammer the object.
-    pub force_share: T,
-    /// Share of `K_st`, from 0 to 1.
-    pub attitude_share: T,
+    /// The force `f_d` that acts, N; it begins small, so that the fingers do not hammer the object.
+    pub force_n: T,
+    /// The stiffness `K_st` that acts, N m.
+    pub attitude_stiffness_nm: T,
 }
 
 /// What the law knows about itself without seeing the object.
@@ -107,8 +108,10 @@ pub struct Monitor<T> {
 /// The grasp law, prepared for one hand.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct GraspLaw<T, const J: usize> {
-    /// `A = f_d / sum(r_i)` (Eq. 38), N/m.
-    approach_stiffness_n_m: T,
+    /// `f_d`, N.
+    force_n: T,
+    /// `1 / sum(r_i)`, 1/m.
+    per_radii_1_m: T,
     /// `K_st`, N m.
     attitude_stiffness_nm: T,
     /// `C`, N m s/rad.
@@ -121,12 +124,22 @@ pub struct GraspLaw<T, const J: usize> {
 impl<T: Real, const J: usize> GraspLaw<T, J> {
     /// `A = f_d / sum(r_i)` (Eq. 38), N/m.
     pub fn approach_stiffness_n_m(&self) -> T {
-        self.approach_stiffness_n_m
+        self.force_n * self.per_radii_1_m
+    }
+
+    /// `f_d` at full force, N.
+    pub fn force_n(&self) -> T {
+        self.force_n
     }
 
     /// `K_st`, N m.
     pub fn attitude_stiffness_nm(&self) -> T {
         self.attitude_stiffness_nm
+    }
+
+    /// The whole grip, as configured.
+    pub fn grip<'a, const F: usize>(&self, latch: &'a Latch<T, F>) -> Grip<'a, T, F> {
+        Grip { latch, force_n: self.force_n, attitude_stiffness_nm: self.attitude_stiffness_nm }
     }
 
     /// Joint torques `u` (Eq. 29), N m, and what the law knows of itself. Without a grip the joints are only damped
@@ -141,12 +154,11 @@ impl<T: Real, const J: usize> GraspLaw<T, J> {
         let mut wrenches = [Wrench::zero(); F];
         let mut monitor = Monitor { approach_potential_j: T::zero(), attitude_potential_j: T::zero() };
         if let Some(grip) = grip {
-            let stiffness = self.approach_stiffness_n_m * grip.force_share;
+            let stiffness = grip.force_n * self.per_radii_1_m;
             monitor.approach_potential_j = self.approach(hand, posture, stiffness, &mut wrenches);
-            let stiffness = self.attitude_stiffness_nm * grip.attitude_share;
-            if stiffness > T::zero() {
+            if grip.attitude_stiffness_nm > T::zero() {
                 monitor.attitude_potential_j =
-                    hold_attitudes(hand, posture, grip.latch, stiffness, &mut wrenches);
+                    hold_attitudes(hand, posture, grip.latch, grip.attitude_stiffness_nm, &mut wrenches);
             }
         }
         let mut torques = hand.fingertip_torques(posture, &wrenches);
@@ -168,7 +180,7 @@ impl<T: Real, const J: usize> GraspLaw<T, J> {
         posture: &Posture<T, J, F>,
     ) -> [Wrench<T>; F] {
         let mut wrenches = [Wrench::zero(); F];
-        self.approach(hand, posture, self.approach_stiffness_n_m, &mut wrenches);
+        self.approach(hand, posture, self.approach_stiffness_n_m(), &mut wrenches);
         wrenches
     }
 

@@ -12,7 +12,9 @@ mod list;
 
 pub use list::List;
 
-use crate::command::Answer;
+use crate::buffer::BufferTooSmall;
+use crate::command::{Answer, Command};
+use crate::event::Events;
 use crate::fault::Raised;
 use crate::limit::Limiting;
 use crate::supervisor::Mode;
@@ -21,7 +23,7 @@ use serde::{Deserialize, Serialize};
 
 /// Version of everything that goes over the wire. Two ends talk when theirs are equal; it has nothing to do with the
 /// release's version.
-pub const INTERFACE_VERSION: u16 = 1;
+pub const INTERFACE_VERSION: u16 = 2;
 
 /// What one tick took in, decided and put out.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -38,6 +40,10 @@ pub struct Record<T, const J: usize> {
     pub fault: Option<Raised>,
     /// What became of the command of this tick.
     pub answer: Option<Answer>,
+    /// What else came from outside in this tick.
+    pub events: Events,
+    /// Why there are no counts, where the joints could not be read.
+    pub reading_failed: Option<Raised>,
     /// The force `f_d` that acts in this tick, N.
     pub force_n: T,
     /// The attitude stiffness `K_st` that acts in this tick, N m.
@@ -46,6 +52,12 @@ pub struct Record<T, const J: usize> {
     pub approach_potential_j: T,
     /// Potential `V_st` of the attitudes, above its least value, J.
     pub attitude_potential_j: T,
+    /// Work of the joints in the last second (fading), J.
+    pub energy_j: T,
+    /// How long the tick before took with reading and writing the joints, processor cycles; 0 where there is no counter.
+    pub cycles: u32,
+    /// Records and answers that were lost since the start because a queue was full.
+    pub dropped: u32,
     /// Encoder counts, one a joint; empty where angles came from elsewhere, or not at all.
     pub counts: List<i32, J>,
     /// Torques of the next tick, N m, one a joint.
@@ -53,18 +65,6 @@ pub struct Record<T, const J: usize> {
     /// What limits each joint's torque.
     pub limiting: List<Limiting, J>,
 }
-
-/// The buffer is too small for the record.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct BufferTooSmall;
-
-impl fmt::Display for BufferTooSmall {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "the buffer is too small for the record")
-    }
-}
-
-impl core::error::Error for BufferTooSmall {}
 
 /// Why bytes are not a record.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -92,9 +92,11 @@ impl<const J: usize> Record<f32, J> {
     /// Bytes that suffice for every record of up to `J` joints (`J` below 16,384).
     pub const MOST_BYTES: usize = {
         let (number, option, float) = (5, 1, 4);
-        let (mode, fault, answer) = (1, option + 2, option + 1 + option + 1);
+        let fault = option + 1 + option + 1;
+        let answer = option + Command::MOST_BYTES + option + 1;
+        let (mode, events) = (1, 1);
         let list = 2;
-        2 * number + mode + fault + answer + 4 * float + 3 * list + J * (number + float + 1)
+        4 * number + mode + 2 * fault + answer + events + 5 * float + 3 * list + J * (number + float + 1)
     };
 
     /// Writes the record into a buffer and returns the part that was written.
@@ -121,7 +123,8 @@ impl<const J: usize> Record<f32, J> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::command::{Command, Refusal};
+    use crate::command::{Command, Grasp, Refusal};
+    use crate::event::Event;
     use crate::fault::Fault;
     use crate::limit::Limit;
     use proptest::prelude::*;
@@ -142,10 +145,15 @@ mod tests {
             mode: Mode::Fault,
             fault: Some(Raised::at(2, Fault::CountJump)),
             answer: Some(Answer { command: Command::ClearFault, refused: Some(Refusal::FaultPersists) }),
+            events: Events::NONE.with(Event::Late, true),
+            reading_failed: Some(Raised::at(2, Fault::SampleMissing)),
             force_n: 5.0,
             attitude_stiffness_nm: 0.005,
             approach_potential_j: 0.25,
             attitude_potential_j: 0.125,
+            energy_j: 0.0625,
+            cycles: 20_000,
+            dropped: 1,
             counts: List::first_of(counts, 3),
             torques_nm: List::first_of(torques, 3),
             limiting: List::first_of(limiting, 3),
@@ -156,7 +164,7 @@ mod tests {
         bytes.iter().map(|byte| format!("{byte:02x}")).collect()
     }
 
-    /// The bytes of interface version 1. If this fails, the interface has changed: raise [`INTERFACE_VERSION`], and
+    /// The bytes of interface version 2. If this fails, the interface has changed: raise [`INTERFACE_VERSION`], and
     /// only then replace the bytes.
     #[test]
     fn golden_bytes() {
@@ -164,18 +172,23 @@ mod tests {
             "ac02",                       // sequence
             "f0a204",                     // tick
             "04",                         // mode
-            "010302",                     // fault
+            "01030102",                   // fault
             "01050106",                   // answer
+            "02",                         // events
+            "01010102",                   // why there are no counts
             "0000a040",                   // force
             "0ad7a33b",                   // attitude stiffness
             "0000803e",                   // approach potential
             "0000003e",                   // attitude potential
+            "0000803d",                   // energy
+            "a09c01",                     // cycles
+            "01",                         // dropped
             "030001c0d102",               // counts
             "030000003f0000a0bf00000000", // torques
             "03000900",                   // limiting
         );
         let mut buffer = [0; Record::<f32, 3>::MOST_BYTES];
-        assert_eq!(INTERFACE_VERSION, 1);
+        assert_eq!(INTERFACE_VERSION, 2);
         assert_eq!(hex(example::<3>().encode(&mut buffer).unwrap()), golden);
         let mut buffer = [0; Record::<f32, 32>::MOST_BYTES];
         assert_eq!(hex(example::<32>().encode(&mut buffer).unwrap()), golden, "depends on the capacity");
@@ -194,17 +207,17 @@ mod tests {
         for command in Command::ALL {
             commands.push(postcard::to_slice(&command, &mut buffer).unwrap().to_vec());
         }
-        assert_eq!(bytes(commands), "000102030405");
+        assert_eq!(bytes(commands), "0001020000030405");
         let mut refusals = Vec::new();
-        for refusal in Refusal::ALL {
+        for refusal in Refusal::ALL.iter().copied() {
             refusals.push(postcard::to_slice(&refusal, &mut buffer).unwrap().to_vec());
         }
-        assert_eq!(bytes(refusals), "00010203040506");
+        assert_eq!(bytes(refusals), "000102030405060708090a0b0c0d0e0f10111213");
         let mut faults = Vec::new();
         for fault in Fault::ALL {
             faults.push(postcard::to_slice(fault, &mut buffer).unwrap().to_vec());
         }
-        assert_eq!(bytes(faults), "010203040506");
+        assert_eq!(bytes(faults), "0102030405060708090a0b0c");
     }
 
     #[test]
@@ -212,6 +225,12 @@ mod tests {
         let record = Record::<f32, 12> {
             sequence: u32::MAX,
             tick: u32::MAX,
+            cycles: u32::MAX,
+            dropped: u32::MAX,
+            answer: Some(Answer {
+                command: Command::Grasp(Grasp { force_n: Some(0.0), attitude_stiffness_nm: Some(0.0) }),
+                refused: Some(Refusal::Busy),
+            }),
             counts: List::first_of([i32::MIN; 12], 12),
             torques_nm: List::first_of([f32::MIN; 12], 12),
             limiting: List::first_of([Limiting::NONE; 12], 12),
@@ -244,8 +263,11 @@ mod tests {
     }
 
     fn answers() -> impl Strategy<Value = Option<Answer>> {
-        let command = proptest::sample::select(&Command::ALL[..]);
-        let refused = proptest::option::of(proptest::sample::select(&Refusal::ALL[..]));
+        let grasp = any::<(Option<f32>, Option<f32>)>().prop_map(|(force_n, attitude_stiffness_nm)| {
+            Command::Grasp(Grasp { force_n, attitude_stiffness_nm })
+        });
+        let command = prop_oneof![proptest::sample::select(&Command::ALL[..]), grasp];
+        let refused = proptest::option::of(proptest::sample::select(Refusal::ALL));
         proptest::option::of((command, refused).prop_map(|(command, refused)| Answer { command, refused }))
     }
 
@@ -253,9 +275,11 @@ mod tests {
         fn records()(
             (sequence, tick) in any::<(u32, u32)>(),
             mode in proptest::sample::select(&Mode::ALL[..]),
-            fault in proptest::option::of((proptest::sample::select(Fault::ALL), any::<u8>())),
+            fault in proptest::option::of((proptest::sample::select(Fault::ALL), any::<Option<u8>>())),
+            (late, heartbeat) in any::<(bool, bool)>(),
+            (cycles, dropped) in any::<(u32, u32)>(),
             answer in answers(),
-            floats in any::<[f32; 4]>(),
+            floats in any::<[f32; 5]>(),
             count in 0..=12_usize,
             counts in any::<[i32; 12]>(),
             torques in any::<[f32; 12]>(),
@@ -272,10 +296,15 @@ mod tests {
                 mode,
                 fault: fault.map(|(fault, joint)| Raised { fault, joint }),
                 answer,
+                events: Events::NONE.with(Event::Late, late).with(Event::Heartbeat, heartbeat),
+                reading_failed: fault.map(|(fault, joint)| Raised { fault, joint }),
                 force_n: floats[0],
                 attitude_stiffness_nm: floats[1],
                 approach_potential_j: floats[2],
                 attitude_potential_j: floats[3],
+                energy_j: floats[4],
+                cycles,
+                dropped,
                 counts: List::first_of(counts, count),
                 torques_nm: List::first_of(torques, count),
                 limiting: List::first_of(limiting, count),

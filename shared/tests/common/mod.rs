@@ -4,7 +4,7 @@
 
 use blindgrasp_shared::control::GraspConfig;
 use blindgrasp_shared::estimate::{Encoder, EstimatorConfig};
-use blindgrasp_shared::fault::FaultConfig;
+use blindgrasp_shared::fault::{FaultConfig, FrozenConfig};
 use blindgrasp_shared::hand::{Fingertip, Hand, Joint, Link};
 use blindgrasp_shared::limit::{LimitConfig, StopConfig};
 use blindgrasp_shared::math::Real;
@@ -87,6 +87,8 @@ pub(crate) fn config<T: Real, const J: usize>() -> Config<T, J> {
             gravity_m_s2: Some(vector(0.0, 0.0, -9.81)),
         },
         limits: LimitConfig {
+            force_n: Some(real(500.0)),
+            attitude_stiffness_nm: Some(real(0.1)),
             torque_nm: Some([real(TORQUE_NM); J]),
             slew_nm_s: Some([real(SLEW_NM_S); J]),
             stops: Some(StopConfig {
@@ -100,6 +102,14 @@ pub(crate) fn config<T: Real, const J: usize>() -> Config<T, J> {
             speed_limit_rad_s: Some([real(20.0); J]),
             range_slack_rad: Some(real(0.05)),
             saturated_ms: Some(200),
+            frozen: Some(FrozenConfig {
+                torque_nm: [real(0.02); J],
+                neighbour_rad: real(0.03),
+                after_ms: 50,
+            }),
+            heartbeat_ms: None,
+            late_ticks: Some(3),
+            energy_j: Some(real(1.0)),
         },
         supervisor: SupervisorConfig { soft_start_ms: 100, release_ms: 100 },
     }

@@ -1,0 +1,224 @@
+//! What is said over the link: requests of the host, replies of the device.
+//!
+//! - A **session** begins with `Hello`, whose answer carries its number; everything else carries that number, and a
+//!   sequence number that grows (modulo 2^16). What is replayed, or comes out of order, is refused. `Stop` is
+//!   taken from whoever it comes.
+//! - Every request is answered: by what it asks for, or by done, or by a [`Refusal`]. Answers carry the request's
+//!   sequence number.
+//! - Records come by themselves, as `Telemetry` asked for.
+
+use crate::command::{Command, Refusal};
+use crate::fault::Raised;
+use crate::identity::Identity;
+use crate::settings::Parameter;
+use crate::telemetry::{DecodeError, List, Record};
+use core::fmt;
+use serde::{Deserialize, Serialize};
+
+/// A request, with whom it comes from and when.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Packet<const J: usize> {
+    /// Number of the session; whatever it likes for `Hello` and `Stop`.
+    pub session: u16,
+    /// Number of the request.
+    pub sequence: u16,
+    /// What is asked for.
+    pub request: Request<J>,
+}
+
+/// What the host can ask for.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub enum Request<const J: usize> {
+    /// Begin a session: who are you? Stays the first for ever.
+    Hello {
+        /// [`INTERFACE_VERSION`](crate::telemetry::INTERFACE_VERSION) of the host.
+        interface_version: u16,
+    },
+    /// Do something with the hand.
+    Command(Command),
+    /// I am still there.
+    Heartbeat,
+    /// Set a parameter, while the hand is disarmed.
+    SetParameter {
+        /// Which.
+        parameter: Parameter,
+        /// Of which joint or axis.
+        index: u8,
+        /// To what.
+        value: f32,
+    },
+    /// Tell a parameter.
+    GetParameter {
+        /// Which.
+        parameter: Parameter,
+        /// Of which joint or axis.
+        index: u8,
+    },
+    /// Send records from now on.
+    Telemetry {
+        /// One in so many ticks; 0 for none.
+        decimation: u16,
+        /// What is in them.
+        signals: Signals,
+    },
+    /// The joints of a hand that is elsewhere: do one tick with them. Only the image `pil` does.
+    Joints(Sample<J>),
+}
+
+/// Joints over the link.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Sample<const J: usize> {
+    /// Encoder counts.
+    pub counts: List<i32, J>,
+    /// Why there are none.
+    pub failed: Option<Raised>,
+    /// Whether the tick before is to count as late.
+    pub late: bool,
+}
+
+/// The parts of a record that need not be sent: a bit each.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Signals(u8);
+
+impl Signals {
+    /// None of them: mode, faults, answers, law and timing alone.
+    pub const NONE: Self = Self(0);
+    /// Encoder counts.
+    pub const COUNTS: Self = Self(1);
+    /// Torques.
+    pub const TORQUES: Self = Self(1 << 1);
+    /// What limits each joint.
+    pub const LIMITING: Self = Self(1 << 2);
+    /// All of them.
+    pub const ALL: Self = Self(0b111);
+
+    /// These and others.
+    #[must_use]
+    pub const fn and(self, other: Self) -> Self {
+        Self(self.0 | other.0)
+    }
+
+    /// Whether all of some others are among them.
+    pub const fn contain(self, other: Self) -> bool {
+        self.0 & other.0 == other.0
+    }
+
+    /// Whether there is a meaning to every bit.
+    pub const fn are_known(self) -> bool {
+        Self::ALL.contain(self)
+    }
+}
+
+impl<const J: usize> Record<f32, J> {
+    /// Leaves out what is not among the signals.
+    pub fn keep(&mut self, signals: Signals) {
+        if !signals.contain(Signals::COUNTS) {
+            self.counts = List::default();
+        }
+        if !signals.contain(Signals::TORQUES) {
+            self.torques_nm = List::default();
+        }
+        if !signals.contain(Signals::LIMITING) {
+            self.limiting = List::default();
+        }
+    }
+}
+
+/// What the device says.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub enum Reply<'a, const J: usize> {
+    /// To `Hello`.
+    Identity {
+        /// Number of the request.
+        sequence: u16,
+        /// Number of the session that begins.
+        session: u16,
+        /// Who it is.
+        #[serde(borrow)]
+        identity: Identity<'a>,
+    },
+    /// Done, or why not.
+    Answer {
+        /// Number of the request.
+        sequence: u16,
+        /// `None`: done.
+        refused: Option<Refusal>,
+    },
+    /// To `GetParameter`.
+    Value {
+        /// Number of the request.
+        sequence: u16,
+        /// Which.
+        parameter: Parameter,
+        /// Of which joint or axis.
+        index: u8,
+        /// What it is.
+        value: f32,
+    },
+    /// What a tick did.
+    Record(Record<f32, J>),
+}
+
+impl<const J: usize> Packet<J> {
+    /// Bytes that suffice for every packet of up to `J` joints: a header, and joints.
+    pub const MOST_BYTES: usize = {
+        let (header, tag, list, failed, late) = (6, 1, 2, 5, 1);
+        let joints = list + 5 * J + failed + late;
+        let others = Command::MOST_BYTES;
+        header + tag + if joints > others { joints } else { others }
+    };
+
+    /// Reads a packet that takes up all the bytes.
+    ///
+    /// # Errors
+    /// If they are anything else.
+    pub fn decode(bytes: &[u8]) -> Result<Self, DecodeError> {
+        match postcard::take_from_bytes(bytes) {
+            Ok((packet, [])) => Ok(packet),
+            Ok(_) => Err(DecodeError::TrailingBytes),
+            Err(_) => Err(DecodeError::Malformed),
+        }
+    }
+}
+
+/// The answer to bytes that are no packet: refused, with the sequence number if they have one.
+pub fn not_understood<const J: usize>(bytes: &[u8]) -> Reply<'static, J> {
+    let sequence = postcard::take_from_bytes::<(u16, u16)>(bytes).map_or(0, |((_, sequence), _)| sequence);
+    Reply::Answer { sequence, refused: Some(Refusal::NotUnderstood) }
+}
+
+impl<'a, const J: usize> Reply<'a, J> {
+    /// Most bytes of the names in an [`Identity`].
+    const NAMES: usize = 160;
+
+    /// Bytes that suffice for every reply of up to `J` joints.
+    pub const MOST_BYTES: usize = {
+        let identity = 6 + Self::NAMES + 40;
+        let record = Record::<f32, J>::MOST_BYTES;
+        1 + if record > identity { record } else { identity }
+    };
+
+    /// Reads a reply that takes up all the bytes.
+    ///
+    /// # Errors
+    /// If they are anything else.
+    pub fn decode(bytes: &'a [u8]) -> Result<Self, DecodeError> {
+        match postcard::take_from_bytes(bytes) {
+            Ok((reply, [])) => Ok(reply),
+            Ok(_) => Err(DecodeError::TrailingBytes),
+            Err(_) => Err(DecodeError::Malformed),
+        }
+    }
+}
+
+impl fmt::Display for Signals {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let names = [(Self::COUNTS, "counts"), (Self::TORQUES, "torques"), (Self::LIMITING, "limiting")];
+        let mut separator = "";
+        for (_, name) in names.into_iter().filter(|&(signal, _)| self.contain(signal)) {
+            write!(f, "{separator}{name}")?;
+            separator = ", ";
+        }
+        Ok(())
+    }
+}

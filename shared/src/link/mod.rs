@@ -1,0 +1,3 @@
+//! The link between a host and a device.
+
+pub mod message;
