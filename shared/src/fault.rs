@@ -61,6 +61,8 @@ faults! {
     BeyondRange      = 4, "angle is beyond its range",                                "move the joint back into its range; check its zero";
     Overspeed        = 5, "speed is above its limit",                                 "check what drives the joint; lower the force or raise the damping";
     SaturatedTooLong = 6, "torque stayed at its limit for too long",                  "look for a jam; lower the force";
+    CounterReset     = 8, "encoder counter lost its settings and its zero",           "check the counter's supply; move the joint to its zero, then clear the fault";
+    OutputFailed     = 9, "torque output failed its read-back",                       "check the output's wiring, supply and load";
 }
 
 impl From<Fault> for u8 {
@@ -260,6 +262,8 @@ mod tests {
             (4, Fault::BeyondRange),
             (5, Fault::Overspeed),
             (6, Fault::SaturatedTooLong),
+            (8, Fault::CounterReset),
+            (9, Fault::OutputFailed),
         ];
         assert_eq!(numbers.len(), Fault::ALL.len());
         for (number, fault) in numbers {

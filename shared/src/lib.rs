@@ -14,6 +14,7 @@ extern crate std;
 
 pub mod command;
 pub mod control;
+pub mod device;
 pub mod estimate;
 pub mod fault;
 pub mod hand;
