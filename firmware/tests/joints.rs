@@ -6,7 +6,7 @@ use blindgrasp_firmware::joints::ls7366r::{FilterClock, Zero};
 use blindgrasp_firmware::joints::{BoardJoints, ConfigError, Joints, JointsConfig, OutputConfig};
 use blindgrasp_shared::device::Reading;
 use blindgrasp_shared::fault::{Fault, Raised};
-use model::{CounterChip, DacChip, Line, Select, Traffic, share};
+use model::{CounterChip, DacChip, Line, Pin, PinEnd, Select, Traffic, share};
 use std::array;
 use std::cell::{RefCell, RefMut};
 use std::rc::Rc;
@@ -14,11 +14,12 @@ use std::rc::Rc;
 /// 10 V is 12 A, 23.4 mN m/A, gear 5.4.
 const NM_PER_VOLT: f32 = 1.2 * 0.0234 * 5.4;
 
-type Hand<const J: usize, const D: usize> = BoardJoints<Select<CounterChip>, Select<DacChip>, J, D>;
+type Hand<const J: usize, const D: usize> = BoardJoints<Select<CounterChip>, Select<DacChip>, PinEnd, J, D>;
 
 struct Board<const J: usize, const D: usize> {
     counters: [Rc<RefCell<CounterChip>>; J],
     dacs: [Rc<RefCell<DacChip>>; D],
+    enable: Rc<Pin>,
     counter_traffic: Rc<RefCell<Traffic>>,
     dac_traffic: Rc<RefCell<Traffic>>,
     config: JointsConfig<J>,
@@ -30,6 +31,7 @@ impl<const J: usize, const D: usize> Board<J, D> {
         Self {
             counters: array::from_fn(|_| share(CounterChip::powered_up())),
             dacs: array::from_fn(|_| share(DacChip::default())),
+            enable: Rc::default(),
             counter_traffic: share(Traffic::default()),
             dac_traffic: share(Traffic::default()),
             config: JointsConfig { filter_clock: FilterClock::Half, outputs },
@@ -40,7 +42,7 @@ impl<const J: usize, const D: usize> Board<J, D> {
     fn try_boot(&self) -> Result<Hand<J, D>, ConfigError> {
         let counters = self.counters.each_ref().map(|chip| Select::to(chip, &self.counter_traffic));
         let dacs = self.dacs.each_ref().map(|chip| Select::to(chip, &self.dac_traffic));
-        BoardJoints::new(counters, dacs, &self.config)
+        BoardJoints::new(counters, dacs, PinEnd(Rc::clone(&self.enable)), &self.config)
     }
 
     fn boot(&self) -> Hand<J, D> {
@@ -60,7 +62,7 @@ impl<const J: usize, const D: usize> Board<J, D> {
     }
 
     fn off(&self) -> bool {
-        self.dacs.iter().all(|dac| dac.borrow().power & 0b1111 == 0)
+        !self.enable.high.get() && self.dacs.iter().all(|dac| dac.borrow().power & 0b1111 == 0)
     }
 }
 
@@ -233,12 +235,13 @@ fn a_setting_that_changed_is_named_within_a_tick_for_each_joint() {
 
 #[test]
 fn two_selects_that_lead_to_one_chip_are_found() {
-    let mut board = Board::<6, 2>::powered_up();
-    board.counters[2] = Rc::clone(&board.counters[5]);
-    let joints = board.boot();
-    let failure = joints.failure().expect("a failure");
-    assert_eq!(failure.raised(), Raised::at(2, Fault::SampleMissing));
-    assert!(failure.to_string().contains("another chip has the same select"), "{failure}");
+    for (joint, other) in (0..6).flat_map(|other| (0..other).map(move |joint| (joint, other))) {
+        let mut board = Board::<6, 2>::powered_up();
+        board.counters[joint] = Rc::clone(&board.counters[other]);
+        let failure = board.boot().failure().expect("a failure");
+        assert_eq!(failure.raised(), Raised::at(joint, Fault::SampleMissing));
+        assert!(failure.to_string().contains("another chip has the same select"), "{failure}");
+    }
 }
 
 #[test]
@@ -268,6 +271,8 @@ fn a_dac_that_does_not_answer_is_named() {
             board.dac(k).line = line;
             let found = (0..12).find_map(|_| joints.write(&[0.5; 12])).expect("found within a turn");
             assert_eq!(found, Raised::at(4 * k, Fault::OutputFailed), "{line:?}");
+            // It may be that this DAC can't be told, but its amplifiers are.
+            assert!(!board.enable.high.get());
             for other in (0..3).filter(|&other| other != k) {
                 assert_eq!(board.dac(other).power & 0b1111, 0);
             }
@@ -291,6 +296,43 @@ fn an_output_that_is_shorted_hot_or_without_power_is_named() {
         assert_eq!(found, Raised::at(joint, Fault::OutputFailed));
         assert!(board.off());
     }
+}
+
+#[test]
+fn switching_off_is_repeated() {
+    let board = Board::<6, 2>::powered_up();
+    let mut joints = board.boot();
+    assert_eq!(joints.write(&[1.0; 6]), None);
+    board.counter(0).line = Line::Cut(0xFF);
+    board.dac(1).line = Line::Error;
+    assert_eq!(joints.read(), failed(0, Fault::SampleMissing));
+    assert!(board.dac(1).power & 0b1111 != 0 && !board.enable.high.get());
+    board.dac(1).line = Line::Whole;
+    assert_eq!(joints.write(&[1.0; 6]), None);
+    assert!(board.off());
+}
+
+#[test]
+fn amplifiers_are_enabled_last_and_only_if_all_is_well() {
+    let board = Board::<6, 2>::powered_up();
+    let mut joints = board.boot();
+    assert!(board.enable.high.get());
+    board.counter(5).lose_power();
+    joints.read();
+    assert!(!board.enable.high.get());
+    for _ in 0..30 {
+        joints.read();
+        joints.write(&[1.0; 6]);
+        assert!(!board.enable.high.get());
+    }
+    joints.recover();
+    assert!(board.enable.high.get());
+
+    board.enable.broken.set(true);
+    let joints = board.boot();
+    let failure = joints.failure().expect("a failure");
+    assert_eq!(failure.raised(), Raised::at(0, Fault::OutputFailed));
+    assert!(board.off());
 }
 
 #[test]

@@ -12,6 +12,10 @@
 //! 0 V), pins LDAC and CLR high (loading is by instruction), the internal reference on REFIN/REFOUT. SYNC is the chip
 //! select. Where several chips share MISO, each SDO has to be released while its SYNC is high.
 //!
+//! Register numbers, bits and the way of reading were compared with Analog Devices' own driver (no-OS, `ad5754r`).
+//! **To be confirmed on the first board**, because no chip has run this code yet: the clock's edges and SDO's delay,
+//! that SDO is released, that an output that is off is held at 0 V, and that alerts stay clear while outputs start.
+//!
 //! The crate `ad57xx` 0.3.0 was not taken: its author could not test reading back, and it assembles the value read from
 //! the wrong byte.
 

@@ -12,7 +12,8 @@
 //!
 //! - **Running**: each tick reads every counter with its status, and reads back the settings of one counter and the
 //!   power, and code of one output, in turn.
-//! - **A failure** switches all outputs off at once. The driver reports it in every tick from then on, and uses the time
+//! - **A failure** switches everything off at once, in two ways that do not need each other: the amplifiers by their
+//!   enable pin, and the DACs over SPI. A DAC that can't be reached any more would keep its last voltage. The driver reports it in every tick from then on, and uses the time
 //!   in which it need not read to repeat the self-test, one chip a tick; what is reported is what the last test
 //!   found, so that after one cable is mended the next one is named.
 //! - **[`recover`](Joints::recover)** ends that, if the self-test has passed: it belongs to the user's command to clear
@@ -29,6 +30,7 @@ use blindgrasp_shared::device::Reading;
 use blindgrasp_shared::fault::{Fault, Raised};
 use core::fmt;
 use dac::{CHANNELS, CODES_PER_VOLT, Dac, DacError};
+use embedded_hal::digital::OutputPin;
 use embedded_hal::spi::SpiDevice;
 use ls7366r::{Counter, CounterError, FilterClock, Zero};
 
@@ -108,6 +110,8 @@ pub enum Cause {
     Counter(CounterError),
     /// The DAC.
     Output(DacError),
+    /// The pin that enables the amplifiers of all joints.
+    Enable,
 }
 
 impl Failure {
@@ -123,7 +127,7 @@ impl Failure {
     pub fn raised(&self) -> Raised {
         let fault = match self.cause {
             Cause::Counter(error) => error.fault(),
-            Cause::Output(_) => Fault::OutputFailed,
+            Cause::Output(_) | Cause::Enable => Fault::OutputFailed,
         };
         Raised::at(self.joint, fault)
     }
@@ -134,13 +138,14 @@ impl fmt::Display for Failure {
         match self.cause {
             Cause::Counter(error) => write!(f, "joint {}: {error}", self.joint),
             Cause::Output(error) => write!(f, "joint {}: {error}", self.joint),
+            Cause::Enable => write!(f, "the pin that enables the amplifiers can't be set"),
         }
     }
 }
 
 #[derive(Clone, Copy, Debug)]
 enum State {
-    /// Counters count and outputs are on.
+    /// Counters count, outputs are on and amplifiers enabled.
     Running,
     /// Outputs are off; `step` is the next step of the self-test.
     Testing { failure: Failure, step: usize },
@@ -148,11 +153,13 @@ enum State {
     Tested { failure: Failure },
 }
 
-/// The joints of the real hand: `J` counters, and `D` DACs of four outputs each.
+/// The joints of the real hand: `J` counters, `D` DACs of four outputs each, and a pin that enables all amplifiers.
 #[derive(Debug)]
-pub struct BoardJoints<C, O, const J: usize, const D: usize> {
+pub struct BoardJoints<C, O, E, const J: usize, const D: usize> {
     counters: [Counter<C>; J],
     dacs: [Dac<O>; D],
+    /// High enables the amplifiers.
+    enable: E,
     codes_per_nm: [f32; J],
     /// The codes that were loaded last.
     codes: [i16; J],
@@ -165,16 +172,23 @@ pub struct BoardJoints<C, O, const J: usize, const D: usize> {
     next_output: usize,
 }
 
-impl<C: SpiDevice, O: SpiDevice, const J: usize, const D: usize> BoardJoints<C, O, J, D> {
-    /// Switches all outputs off, tests all chips, and starts them. Takes about 4 ms for 12 joints. That a test failed
+impl<C: SpiDevice, O: SpiDevice, E: OutputPin, const J: usize, const D: usize> BoardJoints<C, O, E, J, D> {
+    /// Switches everything off, tests all chips, and starts them. Takes about 4 ms for 12 joints. That a test failed
     /// is no error here: [`failure`](Self::failure) and every [`read`](Joints::read) tell it.
+    ///
+    /// The pin `enable` enables the amplifiers of all joints while it is high; a resistor has to hold it low until then.
     ///
     /// # Errors
     /// The numbers can't be those of a board.
-    pub fn new(counters: [C; J], dacs: [O; D], config: &JointsConfig<J>) -> Result<Self, ConfigError> {
+    pub fn new(
+        counters: [C; J],
+        dacs: [O; D],
+        mut enable: E,
+        config: &JointsConfig<J>,
+    ) -> Result<Self, ConfigError> {
         // Before anything else: after a reset the outputs may still be on.
         let mut dacs = dacs.map(Dac::new);
-        silence(&mut dacs);
+        switch_off(&mut enable, &mut dacs);
         if J == 0 || J.div_ceil(CHANNELS) != D {
             return Err(ConfigError::Outputs { joints: J, dacs: D });
         }
@@ -189,6 +203,7 @@ impl<C: SpiDevice, O: SpiDevice, const J: usize, const D: usize> BoardJoints<C, 
         let mut joints = Self {
             counters: counters.map(|spi| Counter::new(spi, config.filter_clock)),
             dacs,
+            enable,
             codes_per_nm,
             codes: [0; J],
             zeros: [Zero::Lost; J],
@@ -221,9 +236,9 @@ impl<C: SpiDevice, O: SpiDevice, const J: usize, const D: usize> BoardJoints<C, 
         &self.zeros
     }
 
-    /// Switches the outputs off, and begins to test.
+    /// Switches everything off, and begins to test.
     fn fail(&mut self, failure: Failure) -> Raised {
-        silence(&mut self.dacs);
+        switch_off(&mut self.enable, &mut self.dacs);
         self.codes = [0; J];
         self.state = State::Testing { failure, step: 0 };
         failure.raised()
@@ -265,7 +280,7 @@ impl<C: SpiDevice, O: SpiDevice, const J: usize, const D: usize> BoardJoints<C, 
         for (k, dac) in self.dacs.iter_mut().enumerate() {
             dac.start().map_err(|error| Failure::of_output(k, error))?;
         }
-        Ok(())
+        self.enable.set_high().map_err(|_| Failure { joint: 0, cause: Cause::Enable })
     }
 
     fn read_counts(&mut self) -> Result<[i32; J], Failure> {
@@ -299,7 +314,9 @@ impl<C: SpiDevice, O: SpiDevice, const J: usize, const D: usize> BoardJoints<C, 
     }
 }
 
-impl<C: SpiDevice, O: SpiDevice, const J: usize, const D: usize> Joints<J> for BoardJoints<C, O, J, D> {
+impl<C: SpiDevice, O: SpiDevice, E: OutputPin, const J: usize, const D: usize> Joints<J>
+    for BoardJoints<C, O, E, J, D>
+{
     fn read(&mut self) -> Reading<J> {
         match self.state {
             State::Running => match self.read_counts() {
@@ -317,7 +334,7 @@ impl<C: SpiDevice, O: SpiDevice, const J: usize, const D: usize> Joints<J> for B
     fn write(&mut self, torques_nm: &[f32; J]) -> Option<Raised> {
         if !matches!(self.state, State::Running) {
             // Once more: the first time may have been lost on the bus. What is wrong, `read` has told.
-            silence(&mut self.dacs);
+            switch_off(&mut self.enable, &mut self.dacs);
             return None;
         }
         let mut raised = None;
@@ -346,8 +363,9 @@ impl<C: SpiDevice, O: SpiDevice, const J: usize, const D: usize> Joints<J> for B
     }
 }
 
-/// Switches all outputs off, as far as the bus allows: a DAC that can't be reached is found by reading back.
-fn silence<O: SpiDevice>(dacs: &mut [Dac<O>]) {
+/// Switches amplifiers and outputs off, as far as they can be reached.
+fn switch_off<E: OutputPin, O: SpiDevice>(enable: &mut E, dacs: &mut [Dac<O>]) {
+    let _ = enable.set_low();
     for dac in dacs {
         let _ = dac.silence();
     }

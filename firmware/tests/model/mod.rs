@@ -1,8 +1,9 @@
 //! The chips as their data sheets describe them, register by register, each behind an SPI device that can be cut.
 #![allow(dead_code, unreachable_pub, reason = "not every test uses all of it")]
 
+use embedded_hal::digital::{self, OutputPin};
 use embedded_hal::spi::{ErrorKind, ErrorType, Operation, SpiDevice};
-use std::cell::RefCell;
+use std::cell::{Cell, RefCell};
 use std::rc::Rc;
 
 /// What becomes of the lines between the microcontroller and a chip.
@@ -239,5 +240,33 @@ impl Chip for DacChip {
         for channel in 0..4 {
             self.most_v = self.most_v.max(self.volts(channel).abs());
         }
+    }
+}
+
+/// A pin, and whether it can be set.
+#[derive(Debug, Default)]
+pub struct Pin {
+    pub high: Cell<bool>,
+    pub broken: Cell<bool>,
+}
+
+pub struct PinEnd(pub Rc<Pin>);
+
+impl digital::ErrorType for PinEnd {
+    type Error = digital::ErrorKind;
+}
+
+impl OutputPin for PinEnd {
+    fn set_low(&mut self) -> Result<(), digital::ErrorKind> {
+        self.0.high.set(false);
+        Ok(())
+    }
+
+    fn set_high(&mut self) -> Result<(), digital::ErrorKind> {
+        if self.0.broken.get() {
+            return Err(digital::ErrorKind::Other);
+        }
+        self.0.high.set(true);
+        Ok(())
     }
 }
