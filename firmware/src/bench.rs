@@ -87,7 +87,8 @@ impl Swinging<'_> {
     fn angles_rad(&self) -> [f32; JOINTS] {
         // A triangle of 0.02 rad in 64 ticks, with a phase of its own for each joint.
         core::array::from_fn(|joint| {
-            let (lower, upper) = self.params.hand().range_rad(joint.min(self.params.hand().joint_count() - 1));
+            let (lower, upper) =
+                self.params.hand().range_rad(joint.min(self.params.hand().joint_count() - 1));
             let phase = (self.tick + 5 * joint) % 64;
             let triangle = if phase < 32 { phase } else { 64 - phase };
             0.5 * (lower + upper) + (triangle as f32 / 32.0 - 0.5) * 0.02
@@ -118,13 +119,18 @@ pub fn run(timer: &mut SYST, control: &mut Control) -> Result<(), &'static str> 
     let params = params();
     let mut figures = Figures::default();
     figures.law_gravity_on = law(&counter, &params, &params.config().law)?;
-    figures.law_gravity_off = law(&counter, &params, &GraspConfig { gravity_m_s2: None, ..params.config().law })?;
+    figures.law_gravity_off =
+        law(&counter, &params, &GraspConfig { gravity_m_s2: None, ..params.config().law })?;
     whole_tick(&counter, &params, control, &mut figures)?;
     print(&figures)
 }
 
 /// Forward kinematics and grasp law.
-fn law(counter: &Counter, params: &HandParams, config: &GraspConfig<f32, JOINTS>) -> Result<u32, &'static str> {
+fn law(
+    counter: &Counter,
+    params: &HandParams,
+    config: &GraspConfig<f32, JOINTS>,
+) -> Result<u32, &'static str> {
     let hand = params.hand();
     let law = config.prepare(hand).map_err(|_| "the law could not be prepared")?;
     let mut joints = Swinging { params, tick: 0 };
@@ -138,7 +144,11 @@ fn law(counter: &Counter, params: &HandParams, config: &GraspConfig<f32, JOINTS>
         let angles_rad = joints.angles_rad();
         most = most.max(counter.instructions(|| {
             hand.forward_kinematics(black_box(&angles_rad), &mut posture);
-            let grip = Grip { latch: &latch, force_n: config.force_n, attitude_stiffness_nm: config.attitude_stiffness_nm };
+            let grip = Grip {
+                latch: &latch,
+                force_n: config.force_n,
+                attitude_stiffness_nm: config.attitude_stiffness_nm,
+            };
             black_box(law.torques(hand, &posture, black_box(&speeds_rad_s), Some(grip)));
         }));
     }

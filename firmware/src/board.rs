@@ -200,7 +200,13 @@ impl Default for Buses {
 }
 
 /// Starts buses and joints. What is wrong with the joints, they tell.
-pub fn joints(spi1: SPI1, spi2: SPI2, pins: JointPins, buses: &'static mut Buses, rcc: &mut Rcc) -> HandJoints {
+pub fn joints(
+    spi1: SPI1,
+    spi2: SPI2,
+    pins: JointPins,
+    buses: &'static mut Buses,
+    rcc: &mut Rcc,
+) -> HandJoints {
     let (sck, miso, mosi) = pins.counter_bus;
     let wires = (Some(sck.into_alternate::<5>().speed(Speed::Medium)), Some(miso), Some(mosi));
     let counters = Spi::new(spi1, wires, ls7366r::SPI_MODE, COUNTER_CLOCK, rcc);
@@ -216,7 +222,8 @@ pub fn joints(spi1: SPI1, spi2: SPI2, pins: JointPins, buses: &'static mut Buses
     let dacs = array::from_fn(|_| Device::new(dacs, selects.next().expect(ENOUGH), Wait));
     let outputs = [OutputConfig { nm_per_volt: NM_PER_VOLT }; JOINTS];
     let config = JointsConfig { filter_clock: FILTER_CLOCK, outputs };
-    HandJoints::new(counters, dacs, pins.enable, &config).expect("the numbers in this file are those of a board")
+    HandJoints::new(counters, dacs, pins.enable, &config)
+        .expect("the numbers in this file are those of a board")
 }
 
 const ENOUGH: &str = "checked when compiled: the board has enough selects";

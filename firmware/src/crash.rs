@@ -63,7 +63,8 @@ fn checksum(words: &Words) -> u32 {
 #[panic_handler]
 fn panic(info: &PanicInfo<'_>) -> ! {
     cortex_m::interrupt::disable();
-    let (line, file_hash) = info.location().map_or((0, 0), |at| (at.line(), CRC.checksum(at.file().as_bytes())));
+    let (line, file_hash) =
+        info.location().map_or((0, 0), |at| (at.line(), CRC.checksum(at.file().as_bytes())));
     keep_and_reset([PANIC, 0, 0, line, file_hash, 0])
 }
 

@@ -41,7 +41,10 @@ impl Frames {
     /// Takes a byte; returns what the frame held that it completes. Bad frames are counted.
     pub fn push(&mut self, byte: u8) -> Option<Received> {
         let payload = self.0.push(byte)?.ok()?;
-        Some(Packet::decode(payload).map_or_else(|_| Received::Unknown(not_understood(payload)), Received::Packet))
+        Some(
+            Packet::decode(payload)
+                .map_or_else(|_| Received::Unknown(not_understood(payload)), Received::Packet),
+        )
     }
 
     /// Frames good and bad.

@@ -26,7 +26,11 @@ pub fn start(boot: &Boot, image: &[u8]) {
     if let Some(crash) = &boot.crash {
         match crash.kind {
             CrashKind::Panic => {
-                defmt::error!("before: panic in line {=u32} of the file {=u32:08x}", crash.line, crash.file_hash);
+                defmt::error!(
+                    "before: panic in line {=u32} of the file {=u32:08x}",
+                    crash.line,
+                    crash.file_hash
+                );
             }
             CrashKind::HardFault => defmt::error!(
                 "before: hard fault at {=u32:08x}, called from {=u32:08x}",

@@ -21,7 +21,6 @@ use stm32f4xx_hal::rcc::Rcc;
 use stm32f4xx_hal::serial::config::{Config, InvalidConfig};
 use stm32f4xx_hal::serial::{Rx, Serial, Tx};
 
-
 /// Bytes between the interrupt and the decoder: 5 ms of a busy line.
 pub type Bytes = Queue<u8, 512>;
 
