@@ -1,10 +1,11 @@
 //! Executed instructions of the parts of a tick, counted in QEMU.
 //!
-//! With `-icount shift=4,sleep=off` QEMU lets 16 ns pass for each instruction, and its SysTick counts 168 MHz: 2.688 counts
-//! an instruction, whatever the host does meanwhile. What reading the timer costs is measured too, and taken off.
-//! The figures are exact and the same in every run; they are instructions, not cycles.
+//! With `-icount shift=4,sleep=off` QEMU lets 16 ns pass for each instruction, and its SysTick counts 168 MHz: 2.688
+//! counts an instruction, whatever the host does meanwhile. What reading the timer costs is measured too, and taken
+//! off. The figures are exact and the same in every run; they are instructions, not cycles.
 //!
-//! Everything is measured in a grasp that has its full force, with joints that move, and the largest of many ticks is told.
+//! Everything is measured in a grasp that has its full force, with joints that move, and the largest of many ticks is
+//! told.
 
 use crate::control::{Control, Timing};
 use crate::joints::Joints;

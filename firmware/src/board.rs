@@ -13,9 +13,9 @@
 //! | select DAC 0 to 3 | PB12, PB11, PB10, PB1 |
 //! | enable all amplifiers | PB0, high; a resistor holds it low |
 //!
-//! Joint `i` of the hand has counter `i`, and output `i mod 4` of DAC `i / 4`. A hand with fewer joints leaves the last
-//! selects unconnected. In every reset, also that of the watchdog or after a crash, all pins are inputs: the amplifiers are
-//! then off.
+//! Joint `i` of the hand has counter `i`, and output `i mod 4` of DAC `i / 4`. A hand with fewer joints leaves the
+//! last selects unconnected. In every reset, also that of the watchdog or after a crash, all pins are inputs: the
+//! amplifiers are then off.
 
 #![allow(unsafe_code)]
 
@@ -47,8 +47,9 @@ pub const SYSTEM_CLOCK: Hertz = Hertz::MHz(168);
 /// has room for 100 bytes each way.
 pub const BAUD: u32 = 1_000_000;
 
-/// The independent watchdog. Its oscillator is between 17 and 47 kHz where 32 are meant (DS8626 table 42), so that this is
-/// between 7 and 19 ms: some ticks may be late, but a control task that stands still is reset soon.
+/// The independent watchdog. Its oscillator is between 17 and 47 kHz where 32 are meant (DS8626, LSI oscillator
+/// characteristics), so that this is between 7 and 19 ms: some ticks may be late, but a control task that stands
+/// still is reset soon.
 pub const WATCHDOG_MS: u32 = 10;
 
 /// The counters' clock. The LS7366R takes SCK times of 100 ns high and 100 ns low at 5 V, a little more at 3.3 V; SPI1
@@ -59,8 +60,8 @@ const COUNTER_CLOCK: Hertz = Hertz::kHz(2_625);
 /// at the falling one. One output, 3 bytes, takes 2.3 us; 12 and the instruction to load them take 34.
 const DAC_CLOCK: Hertz = Hertz::kHz(10_500);
 
-/// The counters' oscillator: 20 MHz. Halved, their input filter lets pass what stays for 4 periods of 10 MHz, 0.4 us: at
-/// 185 rad/s, the most that the motors can do, a quarter of a line of 1,000 a turn of the motor takes 1.6 us.
+/// The counters' oscillator: 20 MHz. Halved, their input filter lets pass what stays for 4 periods of 10 MHz, 0.4 us:
+/// at 185 rad/s, the most that the motors can do, a quarter of a line of 1,000 a turn of the motor takes 1.6 us.
 const FILTER_CLOCK: FilterClock = FilterClock::Half;
 
 /// Torque at a joint for each volt at its amplifier: 1.1 A/V of the amplifier, 23.4 mN m/A of the motor, gear 5.4 to 1.
@@ -84,8 +85,8 @@ pub type CounterBus = SharedBus<Spi<SPI1>>;
 /// The bus of the DACs.
 pub type DacBus = SharedBus<Spi<SPI2>>;
 
-/// A chip-select pin of any port. The HAL's pins of unknown number check the number at each use, and that is a panic that
-/// the control task could reach.
+/// A chip-select pin of any port. The HAL's pins of unknown number check the number at each use, and that is a panic
+/// that the control task could reach.
 pub struct Select {
     port: Port,
     pin: u32,
@@ -107,8 +108,8 @@ impl Select {
 
     /// Writes the port's set-and-reset register: bits 0 to 15 set, 16 to 31 reset (RM0090 8.4.7).
     fn write(&mut self, bits: u32) {
-        // SAFETY: the registers are always there, and writing this one changes only the pins whose bits are set: the pin that
-        // this value took over.
+        // SAFETY: the registers are always there, and writing this one changes only the pins whose bits are set: the
+        // pin that this value took over.
         unsafe {
             match self.port {
                 Port::A => (*GPIOA::ptr()).bsrr().write(|w| w.bits(bits)),

@@ -97,7 +97,8 @@ impl<B: SpiBus, S: OutputPin<Error = Infallible>, D: DelayNs> SpiDevice for Devi
     }
 }
 
-/// Word by word, because the `transfer` of the bus checks indices, and that is a panic that the control task could reach.
+/// Word by word, because the `transfer` of the bus checks indices, and that is a panic that the control task could
+/// reach.
 fn transfer<B: SpiBus>(bus: &mut B, read: &mut [u8], write: &[u8]) -> Result<(), B::Error> {
     let (mut read, mut write) = (read.iter_mut(), write.iter());
     loop {

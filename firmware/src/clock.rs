@@ -6,7 +6,7 @@
 //!
 //! Without the crystal the internal oscillator drives the same 168 MHz. The hand answers and measures, with the
 //! deadlines that it was designed for, but does not arm: the oscillator may be off by 1 % at 25 °C and by up to 8 %
-//! over temperature (DS8626 table 41), and so would be every speed and every time.
+//! over temperature (DS8626, HSI oscillator characteristics), and so would be every speed and every time.
 
 use crate::board;
 use blindgrasp_shared::identity::Clock;
@@ -14,8 +14,8 @@ use stm32f4xx_hal::pac::{DBGMCU, RCC};
 use stm32f4xx_hal::prelude::*;
 use stm32f4xx_hal::rcc::{Config, Rcc};
 
-/// How often the crystal is looked at. It starts within 2 ms (DS8626 table 39); a look takes at least 6 cycles of the
-/// 16 MHz that the processor starts with, so this is 18 ms or more.
+/// How often the crystal is looked at. It starts within 2 ms (DS8626, HSE oscillator characteristics); a look takes
+/// at least 6 cycles of the 16 MHz that the processor starts with, so this is 18 ms or more.
 const MOST_LOOKS: u32 = 50_000;
 
 /// Whether this is QEMU: there the device's identity code, 0x413 on hardware, is not modelled.

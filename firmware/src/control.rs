@@ -40,8 +40,8 @@ impl Control {
         last: Timing,
         dropped: u32,
     ) -> Outputs<JOINTS> {
-        // Joints that failed work again only when the user clears the fault. Whether he may, the tick decides: they have no
-        // torque before that.
+        // Joints that failed work again only when the user clears the fault. Whether he may, the tick decides: they
+        // have no torque before that.
         let clears = |packet: &HandPacket| packet.request == Request::Command(Command::ClearFault);
         if packet.as_ref().is_some_and(clears) {
             joints.recover();

@@ -26,8 +26,8 @@ static mut KEPT: Words = [0; 6];
 /// The crash before this boot, if it was one that ended the last run. It is told once.
 pub fn take() -> Option<Crash> {
     let kept = addr_of_mut!(KEPT);
-    // SAFETY: `KEPT` is valid for reads and writes, any bits are a `Words`, and no one else has a reference to it. It is
-    // volatile because its value comes from before the reset.
+    // SAFETY: `KEPT` is valid for reads and writes, any bits are a `Words`, and no one else has a reference to it. It
+    // is volatile because its value comes from before the reset.
     let words = unsafe { kept.read_volatile() };
     // SAFETY: as above.
     unsafe { kept.write_volatile([0; 6]) };

@@ -1,5 +1,5 @@
-//! What runs on the STM32F405 around the shared [`Device`](blindgrasp_shared::device::Device): wiring, and drivers. What the
-//! hand does is decided there; here are pins, clocks, queues and interrupts.
+//! What runs on the STM32F405 around the shared [`Device`](blindgrasp_shared::device::Device): wiring, and drivers.
+//! What the hand does is decided there; here are pins, clocks, queues and interrupts.
 //!
 //! ```text
 //!  priority 3   USART2 --byte--+

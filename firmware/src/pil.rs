@@ -1,9 +1,10 @@
-//! Processor in the loop: the firmware with its joints at the other end of the link, in lockstep with a simulated plant.
+//! Processor in the loop: the firmware with its joints at the other end of the link, in lockstep with a simulated
+//! plant.
 //!
-//! One [`Request::Joints`] is one tick. Other requests wait; a tick takes the oldest of them. So a host that sends its
-//! requests and then the joints knows in which tick each was taken, and the run is the same to the bit every time. A tick
-//! is answered by the reply to the request that it took, if it took one, and then by its whole record, which is the
-//! end of it.
+//! One [`Request::Joints`] is one tick. Other requests wait; a tick takes the oldest of them. So a host that sends
+//! its requests and then the joints knows in which tick each was taken, and the run is the same to the bit every
+//! time. A tick is answered by the reply to the request that it took, if it took one, and then by its whole record,
+//! which is the end of it.
 //!
 //! Nothing here knows of time: the simulation may be faster or slower than the world.
 

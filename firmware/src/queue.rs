@@ -109,8 +109,8 @@ impl LinkEnd<'_> {
     }
 }
 
-/// Whether a queue has a size of zero, which none has. The library divides by the size; with this asked first, the compiler
-/// sees that the division can't panic.
+/// Whether a queue has a size of zero, which none has. The library divides by the size; with this asked first, the
+/// compiler sees that the division can't panic.
 const fn is_nothing(capacity: usize) -> bool {
     capacity == usize::MAX
 }

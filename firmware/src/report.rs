@@ -1,5 +1,5 @@
-//! Logs: how the start went, and what is wrong with the line. Written by `idle` alone, to RTT, where what finds no room is
-//! dropped.
+//! Logs: how the start went, and what is wrong with the line. Written by `idle` alone, to RTT, where what finds no
+//! room is dropped.
 
 use crate::boot::Boot;
 use crate::{schedule, serial};

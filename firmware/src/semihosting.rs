@@ -1,6 +1,6 @@
 //! Files, arguments and the end of the emulation, asked of QEMU by a breakpoint instruction (Arm, "Semihosting for
-//! AArch32 and AArch64", IHI/DUI 0471). Without a debugger that instruction is a hard fault on hardware, so this is only
-//! used by the image `pil`, and by it only when emulated.
+//! AArch32 and AArch64", IHI/DUI 0471). Without a debugger that instruction is a hard fault on hardware, so this is
+//! only used by the image `pil`, and by it only when emulated.
 #![allow(unsafe_code)]
 
 use cortex_m_semihosting::syscall;

@@ -24,7 +24,8 @@ use stm32f4xx_hal::serial::{Rx, Serial, Tx};
 /// Bytes between the interrupt and the decoder: 5 ms of a busy line.
 pub type Bytes = Queue<u8, 512>;
 
-/// Bytes that came with an overrun, noise, or without their stop bit. The byte is left out; the frame's CRC does the rest.
+/// Bytes that came with an overrun, noise, or without their stop bit. The byte is left out; the frame's CRC does the
+/// rest.
 static LINE_ERRORS: AtomicU32 = AtomicU32::new(0);
 /// Bytes that the queue had no room for.
 static LOST_BYTES: AtomicU32 = AtomicU32::new(0);
