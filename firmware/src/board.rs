@@ -60,8 +60,9 @@ const COUNTER_CLOCK: Hertz = Hertz::kHz(2_625);
 /// at the falling one. One output, 3 bytes, takes 2.3 us; 12 and the instruction to load them take 34.
 const DAC_CLOCK: Hertz = Hertz::kHz(10_500);
 
-/// The counters' oscillator: 20 MHz. Halved, their input filter lets pass what stays for 4 periods of 10 MHz, 0.4 us:
-/// at 185 rad/s, the most that the motors can do, a quarter of a line of 1,000 a turn of the motor takes 1.6 us.
+/// The counters' oscillator is 20 MHz. Their input filter wants at least 4 times the frequency of an encoder's line. That
+/// is 159 kHz at the 1,000 rad/s that the motors can do, with 1,000 lines a turn: half of the oscillator, 10 MHz, is
+/// plenty.
 const FILTER_CLOCK: FilterClock = FilterClock::Half;
 
 /// Torque at a joint for each volt at its amplifier: 1.1 A/V of the amplifier, 23.4 mN m/A of the motor, gear 5.4 to 1.

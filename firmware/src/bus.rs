@@ -80,7 +80,7 @@ impl<B: SpiBus, S: OutputPin<Error = Infallible>, D: DelayNs> SpiDevice for Devi
             let result = operations.iter_mut().try_for_each(|operation| match operation {
                 Operation::Read(words) => bus.read(words),
                 Operation::Write(words) => bus.write(words),
-                Operation::Transfer(read, write) => transfer(bus, read, write),
+                Operation::Transfer(read, write) => bus.transfer(read, write),
                 Operation::TransferInPlace(words) => bus.transfer_in_place(words),
                 Operation::DelayNs(ns) => {
                     bus.flush()?;
@@ -94,23 +94,6 @@ impl<B: SpiBus, S: OutputPin<Error = Infallible>, D: DelayNs> SpiDevice for Devi
             result.and(flushed)
         });
         done.ok_or(DeviceError::Taken)?.map_err(DeviceError::Bus)
-    }
-}
-
-/// Word by word, because the `transfer` of the bus checks indices, and that is a panic that the control task could
-/// reach.
-fn transfer<B: SpiBus>(bus: &mut B, read: &mut [u8], write: &[u8]) -> Result<(), B::Error> {
-    let (mut read, mut write) = (read.iter_mut(), write.iter());
-    loop {
-        let (to, from) = (read.next(), write.next());
-        if to.is_none() && from.is_none() {
-            return Ok(());
-        }
-        let mut word = [from.copied().unwrap_or(0)];
-        bus.transfer_in_place(&mut word)?;
-        if let Some(to) = to {
-            [*to] = word;
-        }
     }
 }
 
@@ -149,17 +132,14 @@ mod tests {
     fn a_transaction_selects_once_and_clocks_every_word() {
         let mut spi = Spi::new(&[
             Transaction::write_vec(vec![1, 2]),
-            // Three to send and two to keep.
-            Transaction::transfer_in_place(vec![3], vec![13]),
-            Transaction::transfer_in_place(vec![4], vec![14]),
-            Transaction::transfer_in_place(vec![5], vec![15]),
+            Transaction::transfer(vec![3, 4], vec![13, 14]),
             Transaction::flush(),
         ]);
         let bus = SharedBus::new(spi.clone());
         let mut device = Device::new(&bus, Select::default(), NoopDelay::new());
         let mut read = [0; 2];
         device
-            .transaction(&mut [Operation::Write(&[1, 2]), Operation::Transfer(&mut read, &[3, 4, 5])])
+            .transaction(&mut [Operation::Write(&[1, 2]), Operation::Transfer(&mut read, &[3, 4])])
             .unwrap();
         assert_eq!(read, [13, 14]);
         assert_eq!((device.select.selected, device.select.low), (1, false));
