@@ -1,4 +1,0 @@
-//! The hand that this firmware is for.
-#![no_std]
-
-pub mod model;
