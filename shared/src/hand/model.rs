@@ -422,3 +422,43 @@ fn rotation_from_z<T: Real>(axis: &Vector3<T>) -> Option<Matrix3<T>> {
     let k = one / (one + c);
     Some(Matrix3::new(one - x * x * k, -x * y * k, x, -x * y * k, one - y * y * k, y, -x, -y, c))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    type Pair = ([PreparedJoint<f32>; 3], [Fingertip<f32>; 2]);
+
+    /// Two fingers, one of two joints.
+    fn pair() -> Pair {
+        let joint = |parent| PreparedJoint { parent, ..PreparedJoint::still() };
+        let fingertip = |link| Fingertip { link, offset_m: Vector3::zeros(), radius_m: 0.01 };
+        ([joint(None), joint(Some(0)), joint(None)], [fingertip(1), fingertip(2)])
+    }
+
+    #[test]
+    fn a_prepared_hand_is_the_hand_that_was_prepared() {
+        let (joints, fingertips) = pair();
+        let hand = Hand::from_prepared(joints, fingertips).unwrap();
+        assert_eq!((hand.joint_count(), hand.fingertip_count()), (3, 2));
+        assert_eq!((hand.prepared_joints(), hand.prepared_fingertips()), (&joints[..], &fingertips[..]));
+        let larger: Hand<f32, 7, 4> = hand.fit().unwrap();
+        assert_eq!((larger.prepared_joints(), larger.prepared_fingertips()), (&joints[..], &fingertips[..]));
+    }
+
+    #[test]
+    fn what_is_no_tree_is_refused() {
+        let (mut joints, fingertips) = pair();
+        joints[1].parent = Some(1);
+        let error = Hand::from_prepared(joints, fingertips).unwrap_err();
+        assert_eq!(error, HandError::ParentNotBefore { joint: 1 });
+        let (joints, mut fingertips) = pair();
+        fingertips[1].link = 3;
+        let error = Hand::from_prepared(joints, fingertips).unwrap_err();
+        assert!(matches!(error, HandError::Fingertip { fingertip: 1, parameter: "link", .. }));
+        let error = Hand::<f32, 3, 1>::from_prepared(joints, [fingertips[0]]).unwrap_err();
+        assert_eq!(error, HandError::TooFewFingertips { count: 1 });
+        let error = Hand::<f32, 0, 2>::from_prepared([], fingertips).unwrap_err();
+        assert_eq!(error, HandError::NoJoints);
+    }
+}
