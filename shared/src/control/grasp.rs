@@ -53,8 +53,8 @@ impl<T: Real, const J: usize> GraspConfig<T, J> {
         if !positive_or_zero(self.attitude_stiffness_nm) {
             return fail("attitude_stiffness_nm", None, "has to be zero or positive");
         }
-        let damping = &self.damping_nm_s[..hand.joint_count()];
-        if let Some(joint) = damping.iter().position(|&c| !positive_or_zero(c)) {
+        let mut damping = self.damping_nm_s.iter().take(hand.joint_count());
+        if let Some(joint) = damping.position(|&c| !positive_or_zero(c)) {
             return fail("damping_nm_s", Some(joint), "has to be zero or positive");
         }
         if self.gravity_m_s2.is_some_and(|g| !g.iter().all(|v| v.is_finite())) {
