@@ -1,0 +1,3 @@
+//! Firmware on a microcontroller, real or emulated.
+
+pub mod image;
