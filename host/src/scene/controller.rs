@@ -52,8 +52,7 @@ impl Setup<'_> {
         let &Self { control, sensors, actuators, .. } = self;
         let stops = control.end_stops.then(|| StopConfig {
             margin_rad: self.each(stop_margin_rad),
-            stiffness_nm_rad: self
-                .each(|joint| STOP_SHARE * joint.torque_limit_nm / stop_margin_rad(joint)),
+            stiffness_nm_rad: self.each(|joint| STOP_SHARE * joint.torque_limit_nm / stop_margin_rad(joint)),
             damping_nm_s: self.each(|joint| 10.0 * self.damping_nm_s(joint)),
         });
         let watched = !sensors.ideal;

@@ -38,9 +38,8 @@ impl HandModel {
     /// One line: where, which key, what is wrong, what to do.
     pub fn load(name_or_path: &str) -> std::result::Result<Self, SceneError> {
         let whole = Place::whole(name_or_path);
-        let mut tree = Document::open(Kind::Hand, name_or_path, Path::new(""))
-            .map_err(|error| error.at(&whole))?
-            .node;
+        let mut tree =
+            Document::open(Kind::Hand, name_or_path, Path::new("")).map_err(|error| error.at(&whole))?.node;
         complete_hand(&mut tree);
         let file = read(&tree, "")?;
         Self::build(&file).map_err(|mut error| {

@@ -24,10 +24,10 @@ mod start;
 mod tests;
 mod tree;
 
-use crate::{Hand, MAX_JOINTS};
 use crate::plant::contact::{FaceContact, FingertipModel};
 use crate::plant::friction::JointFriction;
 use crate::plant::polyhedron::Polyhedron;
+use crate::{Hand, MAX_JOINTS};
 use blindgrasp_shared::control::GraspConfig;
 use blindgrasp_shared::math::Real;
 use blindgrasp_shared::tick::Config;
