@@ -16,11 +16,13 @@ struct Cli {
 #[derive(Subcommand)]
 enum Command {
     Sim(commands::sim::Arguments),
+    Flash(commands::flash::Arguments),
 }
 
 fn main() -> ExitCode {
     let outcome = match Cli::parse().command {
         Command::Sim(arguments) => commands::sim::run(&arguments),
+        Command::Flash(arguments) => commands::flash::run(&arguments),
     };
     match outcome {
         Ok(commands::Outcome::Shown) => ExitCode::SUCCESS,

@@ -1,5 +1,6 @@
 //! What the command line can do, a file a command.
 
+pub(crate) mod flash;
 pub(crate) mod sim;
 
 /// How a command ended that was not misused.
