@@ -13,6 +13,7 @@ pub type Posture = blindgrasp_shared::hand::Posture<f64, MAX_JOINTS, MAX_FINGERS
 
 pub mod plant;
 pub mod record;
+#[cfg(feature = "command")]
 pub mod report;
 pub mod scene;
 pub mod sim;

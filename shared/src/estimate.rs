@@ -46,7 +46,7 @@ use crate::parameter::ParameterError;
 use crate::period::Period;
 
 /// How the counts of one joint are read.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Encoder<T> {
     /// The count at joint angle zero.
     pub zero_count: i32,

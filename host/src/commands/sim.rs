@@ -18,7 +18,7 @@ use std::path::PathBuf;
 /// Exit code 0: the grasp held; 1: it was lost; 2: bad input or usage.
 #[derive(Args)]
 pub(crate) struct Arguments {
-    /// A built-in scene (prism, cube, prism-ideal, cube-ideal, cube-normal-only) or the path of a scene file
+    /// A built-in scene (prism, cube, prism-ideal, cube-ideal, cube-normal-only, two-finger-prism) or the path of a scene file
     scene: String,
     /// Write summary, effective scene, trace, plots, pictures and an animation to this directory
     #[arg(long, value_name = "DIR")]

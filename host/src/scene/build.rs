@@ -3,7 +3,7 @@
 use super::{
     Scene,
     check::{Result, all_within, fail, name, within},
-    file::{SCHEMA, SceneFile},
+    file::{Control, SCHEMA, SceneFile},
     hand::{fingertip_parameters, hand, joint_parameters, moving_masses, overlaps},
     object::object,
     start::{attitude, start},
@@ -14,7 +14,9 @@ use nalgebra::Vector3;
 const LONGEST_RUN_S: f64 = 3600.0;
 
 /// Checks a configuration and prepares the scene.
-pub(super) fn scene(file: SceneFile) -> Result<Scene> {
+pub(super) fn scene(mut file: SceneFile) -> Result<Scene> {
+    // Those of the scene are what acts.
+    file.hand.control = None;
     let mut warnings = Vec::new();
     for (key, word) in
         [("name", &file.name), ("hand.name", &file.hand.name), ("object.name", &file.object.name)]
@@ -79,28 +81,8 @@ fn settings(file: &SceneFile) -> Result<usize> {
         }
     }
     let control = &file.control;
-    within("control.period_s", control.period_s, 1e-4, 0.1)?;
-    let microseconds = control.period_s * 1e6;
-    if (microseconds - microseconds.round()).abs() > 1e-6 {
-        return fail(
-            "control.period_s",
-            format!("{:?} s is no whole number of microseconds", control.period_s),
-            format!("{:?} is", microseconds.round() * 1e-6),
-        );
-    }
+    self::control(control)?;
     within("duration_s", file.duration_s, control.period_s, LONGEST_RUN_S)?;
-    within("control.force_n", control.force_n, 1e-6, 1e4)?;
-    within("control.attitude_stiffness_nm", control.attitude_stiffness_nm, 0.0, 1e4)?;
-    within("control.damping_scale", control.damping_scale, 0.0, 1e4)?;
-    within("control.soft_start_s", control.soft_start_s, 0.0, LONGEST_RUN_S)?;
-    // The tick's own bounds, so that the file and the key are named here.
-    let fastest_hz = 1.0 / (std::f64::consts::PI * control.period_s);
-    within(
-        "control.estimator_bandwidth_hz",
-        control.estimator_bandwidth_hz,
-        1e-3 * fastest_hz,
-        0.999 * fastest_hz,
-    )?;
     within("sensors.noise_counts", file.sensors.noise_counts, 0.0, 1e6)?;
     if file.actuators.output_delay_ticks > 1 {
         return fail(
@@ -128,4 +110,29 @@ fn settings(file: &SceneFile) -> Result<usize> {
         );
     }
     Ok(substeps as usize)
+}
+
+/// The gains, of a scene or of a hand.
+pub(super) fn control(control: &Control) -> Result<()> {
+    within("control.period_s", control.period_s, 1e-4, 0.1)?;
+    let microseconds = control.period_s * 1e6;
+    if (microseconds - microseconds.round()).abs() > 1e-6 {
+        return fail(
+            "control.period_s",
+            format!("{:?} s is no whole number of microseconds", control.period_s),
+            format!("{:?} is", microseconds.round() * 1e-6),
+        );
+    }
+    within("control.force_n", control.force_n, 1e-6, 1e4)?;
+    within("control.attitude_stiffness_nm", control.attitude_stiffness_nm, 0.0, 1e4)?;
+    within("control.damping_scale", control.damping_scale, 0.0, 1e4)?;
+    within("control.soft_start_s", control.soft_start_s, 0.0, LONGEST_RUN_S)?;
+    // The tick's own bounds, so that the file and the key are named here.
+    let fastest_hz = 1.0 / (std::f64::consts::PI * control.period_s);
+    within(
+        "control.estimator_bandwidth_hz",
+        control.estimator_bandwidth_hz,
+        1e-3 * fastest_hz,
+        0.999 * fastest_hz,
+    )
 }

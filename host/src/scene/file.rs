@@ -280,6 +280,9 @@ pub struct HandFile {
     /// A sentence or two.
     #[serde(default)]
     pub description: String,
+    /// The gains of its firmware. A scene has its own.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub control: Option<Control>,
     /// The joints, each after its parent. In a file, keys of `[joint_defaults]` stand for those that a joint leaves out.
     #[serde(rename = "joint")]
     pub joints: Vec<JointFile>,

@@ -35,9 +35,11 @@ impl Kind {
     /// Names and texts.
     pub(super) fn built_in(self) -> &'static [(&'static str, &'static str)] {
         match self {
-            Self::Scene => built_in!("scenes": "prism" "cube" "prism-ideal" "cube-ideal" "cube-normal-only"),
-            Self::Hand => built_in!("hands": "three-finger"),
-            Self::Object => built_in!("objects": "prism" "cube"),
+            Self::Scene => {
+                built_in!("scenes": "prism" "cube" "prism-ideal" "cube-ideal" "cube-normal-only" "two-finger-prism")
+            }
+            Self::Hand => built_in!("hands": "three-finger" "two-finger"),
+            Self::Object => built_in!("objects": "prism" "cube" "hexagonal-prism"),
         }
     }
 }
@@ -93,6 +95,10 @@ impl Document {
             }
         }
         for setting in settings.iter().filter(|setting| !is_reference(setting)) {
+            if let Some(key) = setting.key.strip_prefix("hand.control") {
+                let (problem, remedy) = ("acts in the firmware only", format!("set control{key}"));
+                return Err(SceneError::new(&setting.key, problem, remedy).at(&Place::whole("--set")));
+            }
             self.node.set(setting)?;
         }
         Ok(self.node)

@@ -10,22 +10,29 @@
 
 mod build;
 mod check;
+mod controller;
 mod error;
 pub mod file;
 mod hand;
+mod hand_model;
 mod library;
 mod object;
 pub mod placement;
 mod read;
+mod source;
 mod start;
 #[cfg(test)]
 mod tests;
 mod tree;
 
-use crate::Hand;
 use crate::plant::contact::{FaceContact, FingertipModel};
 use crate::plant::friction::JointFriction;
 use crate::plant::polyhedron::Polyhedron;
+use crate::{Hand, MAX_JOINTS};
+use blindgrasp_shared::control::GraspConfig;
+use blindgrasp_shared::math::Real;
+use blindgrasp_shared::tick::Config;
+use controller::Setup;
 use library::{Document, Kind};
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 use std::path::Path;
@@ -33,6 +40,8 @@ use tree::{Node, Setting};
 
 pub use error::{Place, SceneError};
 pub use file::{Actuators, Control, Friction, HandFile, ObjectFile, PlantSettings, SceneFile, Sensors};
+pub use hand_model::HandModel;
+pub use source::config_source;
 
 /// A scene, checked and ready for the simulator.
 #[derive(Clone, Debug, PartialEq)]
@@ -157,6 +166,26 @@ impl Scene {
     pub fn effective_toml(&self) -> String {
         // Only what TOML can't express fails, and none of the structs contains such a thing.
         toml::to_string(&self.file).unwrap_or_default()
+    }
+
+    /// The configuration of the controller; zero beyond the hand's joints.
+    pub fn controller_config(&self) -> Config<f32, MAX_JOINTS> {
+        self.setup().config()
+    }
+
+    /// The gains of the grasp law, in either precision.
+    pub fn law_config<T: Real>(&self) -> GraspConfig<T, MAX_JOINTS> {
+        self.setup().law()
+    }
+
+    fn setup(&self) -> Setup<'_> {
+        Setup {
+            joints: &self.file.hand.joints,
+            control: &self.control,
+            sensors: &self.sensors,
+            actuators: &self.actuators,
+            gravity_m_s2: self.plant.gravity_m_s2,
+        }
     }
 
     /// Names of the built-in scenes.

@@ -4,40 +4,9 @@ use crate::plant::dynamics::JointVector;
 use crate::scene::Scene;
 use crate::{MAX_FINGERS, MAX_JOINTS};
 use blindgrasp_shared::command::{Command, Grasp};
-use blindgrasp_shared::control::GraspConfig;
-use blindgrasp_shared::estimate::{Encoder, EstimatorConfig};
-use blindgrasp_shared::fault::{FaultConfig, FrozenConfig};
-use blindgrasp_shared::limit::{LimitConfig, StopConfig};
-use blindgrasp_shared::math::Real;
 use blindgrasp_shared::parameter::ParameterError;
-use blindgrasp_shared::supervisor::SupervisorConfig;
-use blindgrasp_shared::tick::{Config, Input, Output, Params, State, tick};
-use nalgebra::Vector3;
+use blindgrasp_shared::tick::{Input, Output, Params, State, tick};
 use std::f64::consts::TAU;
-
-/// How far before its end stop a joint is slowed, rad; less in a joint of small range.
-const STOP_MARGIN_RAD: f64 = 0.1;
-/// What a soft end stop pushes back with once its margin is used up, as a share of the joint's torque limit.
-const STOP_SHARE: f64 = 0.1;
-/// How far a joint may be beyond its range before that is a fault, rad.
-const RANGE_SLACK_RAD: f64 = 0.1;
-/// How much faster than its motor a joint may seem to be before its counts are not believed.
-const IMPOSSIBLE_SPEED: f64 = 1.5;
-/// How long a torque may stay at its limit, ms.
-const SATURATED_MS: u32 = 1000;
-/// How many times as firmly as configured a user may grasp.
-const FIRMEST: f64 = 4.0;
-/// A counter that stands still is not believed for longer than this, ms, ...
-const FROZEN_MS: u32 = 50;
-/// ... once the torque changed by this share of its limit ...
-const FROZEN_SHARE: f64 = 0.02;
-/// ... and a neighbour turned by this, rad. In grasps of the prism and the cube, with up to three times the friction and
-/// twice the force, neighbours of joints that really stood still turned by 0.011 rad at most.
-const FROZEN_NEIGHBOUR_RAD: f64 = 0.03;
-/// The work of a second is at most that of all torque limits over this angle, rad.
-const ENERGY_TRAVEL_RAD: f64 = 0.1;
-/// How long letting go takes, ms.
-const RELEASE_MS: u32 = 300;
 
 /// Encoders and the tick.
 pub(super) struct Controller {
@@ -55,7 +24,7 @@ pub(super) struct Controller {
 
 impl Controller {
     pub(super) fn new(scene: &Scene) -> Result<Self, ParameterError> {
-        let config = config(scene);
+        let config = scene.controller_config();
         let mut counts_per_rad = [0.0; MAX_JOINTS];
         for (counts, joint) in counts_per_rad.iter_mut().zip(&scene.joints) {
             *counts = joint.encoder_counts_per_turn / TAU;
@@ -141,86 +110,4 @@ impl Controller {
         let joint = joint.map_or(String::new(), |name| format!("joint `{name}`: "));
         Some(format!("fault {}: {joint}{}", raised.fault.number(), raised.fault.words()))
     }
-}
-
-/// Gains of the law, in either precision.
-pub(super) fn grasp_config<T: Real>(scene: &Scene) -> GraspConfig<T, MAX_JOINTS> {
-    GraspConfig {
-        force_n: T::from_f64(scene.control.force_n),
-        attitude_stiffness_nm: T::from_f64(scene.control.attitude_stiffness_nm),
-        damping_nm_s: each(scene, 0.0, |k| scene.joints[k].damping_gain_nm_s_rad),
-        gravity_m_s2: scene
-            .control
-            .gravity_compensation
-            .then(|| Vector3::from(scene.plant.gravity_m_s2).map(T::from_f64)),
-    }
-}
-
-/// Everything that the tick needs, as the scene has it.
-fn config(scene: &Scene) -> Config<f32, MAX_JOINTS> {
-    let joint_files = &scene.file.hand.joints;
-    let range = |k: usize| joint_files[k].limits_rad[1] - joint_files[k].limits_rad[0];
-    let margin = |k: usize| STOP_MARGIN_RAD.min(range(k) / 8.0);
-    let stops = scene.control.end_stops.then(|| StopConfig {
-        margin_rad: each(scene, 1.0, margin),
-        stiffness_nm_rad: each(scene, 0.0, |k| STOP_SHARE * joint_files[k].torque_limit_nm / margin(k)),
-        damping_nm_s: each(scene, 0.0, |k| 10.0 * scene.joints[k].damping_gain_nm_s_rad),
-    });
-    let watched = !scene.sensors.ideal;
-    Config {
-        period_us: (scene.control.period_s * 1e6).round() as u32,
-        estimator: EstimatorConfig {
-            bandwidth_hz: scene.control.estimator_bandwidth_hz as f32,
-            encoders: std::array::from_fn(|k| Encoder {
-                zero_count: 0,
-                rad_per_count: scene
-                    .joints
-                    .get(k)
-                    .map_or(1.0, |joint| (TAU / joint.encoder_counts_per_turn) as f32),
-                reversed: false,
-            }),
-        },
-        law: grasp_config(scene),
-        limits: LimitConfig {
-            force_n: scene.actuators.torque_limits.then_some((FIRMEST * scene.control.force_n) as f32),
-            attitude_stiffness_nm: scene
-                .actuators
-                .torque_limits
-                .then_some((FIRMEST * scene.control.attitude_stiffness_nm) as f32),
-            torque_nm: scene
-                .actuators
-                .torque_limits
-                .then(|| each(scene, 1.0, |k| scene.joints[k].torque_limit_nm)),
-            slew_nm_s: scene.actuators.slew_limit_nm_s.map(|limit| each(scene, limit, |_| limit)),
-            stops,
-        },
-        faults: FaultConfig {
-            possible_speed_rad_s: watched
-                .then(|| each(scene, 1.0, |k| IMPOSSIBLE_SPEED * scene.joints[k].speed_limit_rad_s)),
-            speed_limit_rad_s: watched.then(|| each(scene, 1.0, |k| scene.joints[k].speed_limit_rad_s)),
-            range_slack_rad: scene.control.end_stops.then_some(RANGE_SLACK_RAD as f32),
-            saturated_ms: scene.actuators.torque_limits.then_some(SATURATED_MS),
-            frozen: (watched && scene.actuators.torque_limits).then(|| FrozenConfig {
-                torque_nm: each(scene, 1.0, |k| FROZEN_SHARE * scene.joints[k].torque_limit_nm),
-                neighbour_rad: FROZEN_NEIGHBOUR_RAD as f32,
-                after_ms: FROZEN_MS,
-            }),
-            heartbeat_ms: None,
-            late_ticks: None,
-            energy_j: scene.actuators.torque_limits.then(|| {
-                let torques: f64 = scene.joints.iter().map(|joint| joint.torque_limit_nm).sum();
-                (ENERGY_TRAVEL_RAD * torques) as f32
-            }),
-        },
-        supervisor: SupervisorConfig {
-            soft_start_ms: (scene.control.soft_start_s * 1e3).round() as u32,
-            release_ms: RELEASE_MS,
-        },
-    }
-}
-
-/// A value a joint of the scene's hand, `rest` beyond them.
-fn each<T: Real>(scene: &Scene, rest: f64, value: impl Fn(usize) -> f64) -> [T; MAX_JOINTS] {
-    let joints = scene.joints.len();
-    std::array::from_fn(|k| T::from_f64(if k < joints { value(k) } else { rest }))
 }

@@ -23,7 +23,7 @@ use crate::record::sample::Sample;
 use crate::scene::Scene;
 use blindgrasp_shared::control::GraspLaw;
 use blindgrasp_shared::parameter::ParameterError;
-use controller::{Controller, grasp_config};
+use controller::Controller;
 use nalgebra::Vector3;
 use observe::{Observer, Seen};
 use std::time::Instant;
@@ -172,7 +172,7 @@ impl Simulation {
 /// # Errors
 /// A gain that is out of its range.
 pub fn law(scene: &Scene) -> Result<GraspLaw<f64, MAX_JOINTS>, ParameterError> {
-    grasp_config(scene).prepare(&scene.hand)
+    scene.law_config().prepare(&scene.hand)
 }
 
 /// The plant of a scene.

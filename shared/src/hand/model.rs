@@ -131,22 +131,26 @@ impl core::error::Error for HandError {}
 
 /// A joint as the kinematics wants it: its link frame is chosen such that the joint turns about the local z axis.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct PreparedJoint<T> {
-    pub(super) parent: Option<usize>,
+pub struct PreparedJoint<T> {
+    /// Index of the parent link's joint, smaller than this joint's own; `None` for the base.
+    pub parent: Option<usize>,
     /// Joint origin in the parent's prepared frame, m.
-    pub(super) offset_m: Vector3<T>,
+    pub offset_m: Vector3<T>,
     /// Prepared frame at zero angle in the parent's prepared frame; `None` where the two axes are parallel, because the
     /// frame is then chosen to be the parent's, and forward kinematics saves a product.
-    pub(super) attitude: Option<Matrix3<T>>,
+    pub attitude: Option<Matrix3<T>>,
     /// Prepared frame in the link frame of the description.
-    pub(super) from_link: Matrix3<T>,
-    pub(super) lower_rad: T,
-    pub(super) upper_rad: T,
-    pub(super) link: Link<T>,
+    pub from_link: Matrix3<T>,
+    /// Lower end stop, rad.
+    pub lower_rad: T,
+    /// Upper end stop, rad.
+    pub upper_rad: T,
+    /// The link that turns with the joint, in the prepared frame.
+    pub link: Link<T>,
     /// Mass of the link times its centre, kg m.
-    pub(super) first_moment_kg_m: Vector3<T>,
+    pub first_moment_kg_m: Vector3<T>,
     /// Mass of everything that the joint carries, kg.
-    pub(super) carried_kg: T,
+    pub carried_kg: T,
 }
 
 /// A hand, checked and prepared: at most `J` joints and `F` fingertips.
@@ -196,6 +200,51 @@ impl<T: Real, const J: usize, const F: usize> Hand<T, J, F> {
             Some(joint) => Err(HandError::MovesNoFingertip { joint }),
             None => Ok(hand),
         }
+    }
+
+    /// A hand of exact size from what [`Self::prepared_joints`] and [`Self::prepared_fingertips`] gave, as a constant: the
+    /// host prepares a hand, the firmware is built with the result. What was computed is believed, the tree is checked.
+    ///
+    /// # Errors
+    /// No joint, fewer than two fingertips, a parent that does not come before its joint, or a fingertip on no link.
+    pub const fn from_prepared(
+        joints: [PreparedJoint<T>; J],
+        fingertips: [Fingertip<T>; F],
+    ) -> Result<Self, HandError> {
+        if J == 0 {
+            return Err(HandError::NoJoints);
+        }
+        if F < 2 {
+            return Err(HandError::TooFewFingertips { count: F });
+        }
+        let mut joint = 0;
+        while joint < J {
+            if let Some(parent) = joints[joint].parent
+                && parent >= joint
+            {
+                return Err(HandError::ParentNotBefore { joint });
+            }
+            joint += 1;
+        }
+        let mut fingertip = 0;
+        while fingertip < F {
+            if fingertips[fingertip].link >= J {
+                let reason = "has to be the index of a joint";
+                return Err(HandError::Fingertip { fingertip, parameter: "link", reason });
+            }
+            fingertip += 1;
+        }
+        Ok(Self { joint_count: J, fingertip_count: F, joints, fingertips })
+    }
+
+    /// The joints as they were prepared.
+    pub fn prepared_joints(&self) -> &[PreparedJoint<T>] {
+        &self.joints[..self.joint_count.min(J)]
+    }
+
+    /// The fingertips as they were prepared: their offsets are in the prepared frames of their links.
+    pub fn prepared_fingertips(&self) -> &[Fingertip<T>] {
+        &self.fingertips[..self.fingertip_count.min(F)]
     }
 
     /// The same hand in another scalar: prepared in `f64`, used in `f32`.

@@ -188,7 +188,7 @@ fn errors_in_hands_and_objects_name_their_file() {
         ),
         (
             "hand=four-finger",
-            "--set: hand: no built-in hand is called `four-finger`; known: three-finger (a path has to end in .toml or contain a /)",
+            "--set: hand: no built-in hand is called `four-finger`; did you mean `two-finger`? (a path has to end in .toml or contain a /)",
         ),
         (
             "object.mass_kg=0",

@@ -1,0 +1,16 @@
+//! The hand that this firmware is for: chosen, checked and turned into constants by `build.rs`.
+
+use blindgrasp_shared::tick::Params;
+
+include!(concat!(env!("OUT_DIR"), "/hand.rs"));
+
+/// The hand's parameters.
+///
+/// # Panics
+/// Never: the build checked the same numbers.
+pub fn params() -> Params<f32, JOINTS, FINGERS> {
+    match Params::new(HAND.clone(), &CONFIG) {
+        Ok(params) => params,
+        Err(_) => unreachable!("the build has checked them"),
+    }
+}

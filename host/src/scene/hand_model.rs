@@ -1,0 +1,125 @@
+//! A hand without a scene: what its firmware is built with.
+
+use super::{
+    build::control,
+    check::{Result, fail, name},
+    controller::Setup,
+    error::{Place, SceneError},
+    file::{Actuators, HandFile, PlantSettings, SCHEMA, Sensors},
+    hand::hand,
+    library::{Document, Kind, complete_hand},
+    read::read,
+    source::{IMPORTS, Source, config_source},
+};
+use crate::{Hand, MAX_JOINTS};
+use blindgrasp_shared::tick::{Config, Params};
+use std::path::Path;
+
+/// How long the host's heartbeat may fail while the hand has torque, ms.
+const HEARTBEAT_MS: u32 = 250;
+/// How many ticks in a row may be late.
+const LATE_TICKS: u32 = 3;
+
+/// A hand, checked, with the configuration that its file asks for: the gains of `[control]`, and all limits and faults that
+/// a real hand has. Gravity is along `-z` of the base: the palm looks up.
+#[derive(Clone, Debug, PartialEq)]
+pub struct HandModel {
+    /// Its name.
+    pub name: String,
+    /// Kinematics and link masses.
+    pub hand: Hand,
+    /// Names of the joints, in the hand's order.
+    pub joint_names: Vec<String>,
+    /// The controller's configuration; zero beyond the hand's joints.
+    pub config: Config<f32, MAX_JOINTS>,
+    /// What is odd but can be used, in words.
+    pub warnings: Vec<String>,
+}
+
+impl HandModel {
+    /// Loads a hand by its built-in name or by its path, which ends in `.toml` or contains a separator. Its file needs the
+    /// table `[control]`.
+    ///
+    /// # Errors
+    /// One line: where, which key, what is wrong, what to do.
+    pub fn load(name_or_path: &str) -> std::result::Result<Self, SceneError> {
+        let whole = Place::whole(name_or_path);
+        let mut tree =
+            Document::open(Kind::Hand, name_or_path, Path::new("")).map_err(|error| error.at(&whole))?.node;
+        complete_hand(&mut tree);
+        let file = read(&tree, "")?;
+        Self::build(&file).map_err(|mut error| {
+            // The checks know the keys of a scene.
+            if let Some(key) = error.key.strip_prefix("hand.") {
+                error.key = key.into();
+            }
+            let place = tree.place_of(&error.key).clone();
+            error.at(&place)
+        })
+    }
+
+    fn build(file: &HandFile) -> Result<Self> {
+        if file.schema != SCHEMA {
+            return fail(
+                "schema",
+                format!("{} is a format that this program does not know", file.schema),
+                format!("write it as format {SCHEMA}"),
+            );
+        }
+        name("name", &file.name)?;
+        let Some(gains) = &file.control else {
+            return fail(
+                "control",
+                "the hand says nothing of its gains, which its firmware needs",
+                "add a table [control] with the keys that a scene's has: force_n, attitude_stiffness_nm, ...",
+            );
+        };
+        control(gains)?;
+        let mut warnings = Vec::new();
+        let hand = hand(file, &mut warnings)?;
+        let setup = Setup {
+            joints: &file.joints,
+            control: gains,
+            sensors: &Sensors::default(),
+            actuators: &Actuators::default(),
+            gravity_m_s2: PlantSettings::default().gravity_m_s2,
+        };
+        let mut config = setup.config();
+        config.faults.heartbeat_ms = Some(HEARTBEAT_MS);
+        config.faults.late_ticks = Some(LATE_TICKS);
+        // What is in range in f64 may not be in f32.
+        if let Err(error) = Params::new(hand.cast::<f32>(), &config) {
+            return fail("control", format!("the controller refuses it: {error}"), "");
+        }
+        let joint_names = file.joints.iter().map(|joint| joint.name.clone()).collect();
+        Ok(Self { name: file.name.clone(), hand, joint_names, config, warnings })
+    }
+
+    /// What the firmware is built with, as Rust source: the constants `JOINTS`, `FINGERS`, `HAND` and `CONFIG`. The same hand
+    /// gives the same text, wherever its file lies.
+    pub fn source(&self) -> String {
+        let hand = self.hand.cast::<f32>();
+        let (joints, fingertips) = (hand.prepared_joints(), hand.prepared_fingertips());
+        let count = joints.len();
+        format!(
+            "{IMPORTS}
+/// Joints of the hand.
+pub const JOINTS: usize = {count};
+/// Fingertips of the hand.
+pub const FINGERS: usize = {};
+/// The hand `{}`, prepared.
+pub static HAND: Hand<f32, JOINTS, FINGERS> = match Hand::from_prepared({}, {}) {{
+    Ok(hand) => hand,
+    Err(_) => panic!(\"the joints are no tree\"),
+}};
+/// Its gains, limits and times.
+pub static CONFIG: Config<f32, JOINTS> = {};
+",
+            fingertips.len(),
+            self.name,
+            joints.source(count),
+            fingertips.source(count),
+            config_source(&self.config, count),
+        )
+    }
+}

@@ -1,0 +1,122 @@
+//! Hands without a scene: what a firmware is built with, and what is said of a file that it can't be built with.
+
+use super::*;
+use crate::scene::HandModel;
+
+fn hand_text() -> &'static str {
+    Kind::Hand.built_in().iter().find(|(name, _)| *name == "three-finger").unwrap().1
+}
+
+/// The whole message, for a hand whose text is changed in one place, without the folder it is in.
+fn message(from: &str, to: &str) -> String {
+    assert!(hand_text().contains(from), "{from}");
+    let folder = std::env::temp_dir().join(format!("blindgrasp-hand-test-{}", std::process::id()));
+    std::fs::create_dir_all(&folder).unwrap();
+    let path = folder.join("h.toml");
+    std::fs::write(&path, hand_text().replacen(from, to, 1)).unwrap();
+    let error = HandModel::load(path.to_str().unwrap()).expect_err("has to be refused").to_string();
+    std::fs::remove_dir_all(&folder).unwrap();
+    error.replace(path.to_str().unwrap(), "h.toml")
+}
+
+fn line(of: &str) -> usize {
+    1 + hand_text().lines().position(|line| line.contains(of)).unwrap()
+}
+
+#[test]
+fn shipped_hands_are_models_without_warnings() {
+    for (name, size) in [("three-finger", (12, 3)), ("two-finger", (8, 2))] {
+        let model = HandModel::load(name).unwrap_or_else(|error| panic!("{error}"));
+        assert_eq!(model.name, name);
+        assert_eq!((model.hand.joint_count(), model.hand.fingertip_count()), size);
+        assert_eq!(model.joint_names.len(), size.0);
+        assert_eq!(model.warnings, Vec::<String>::new());
+    }
+}
+
+/// The scenes with the paper's experiments say the same as the hand itself, but for what only a real hand has.
+#[test]
+fn a_model_has_the_configuration_of_its_experiments() {
+    for (scene, hand) in
+        [("prism", "three-finger"), ("cube", "three-finger"), ("two-finger-prism", "two-finger")]
+    {
+        let (scene, model) = (load(scene, &[]).unwrap(), HandModel::load(hand).unwrap());
+        assert_eq!(model.hand, scene.hand);
+        let mut expected = scene.controller_config();
+        assert_eq!((expected.faults.heartbeat_ms, expected.faults.late_ticks), (None, None));
+        expected.faults.heartbeat_ms = Some(250);
+        expected.faults.late_ticks = Some(3);
+        assert_eq!(model.config, expected);
+    }
+}
+
+#[test]
+fn the_same_hand_gives_the_same_constants_wherever_it_lies() {
+    let manifest = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let path = manifest.join("../models/hands/three-finger.toml");
+    let from_disk = HandModel::load(path.to_str().unwrap()).unwrap();
+    let built_in = HandModel::load("three-finger").unwrap();
+    assert_eq!(from_disk, built_in);
+    assert_eq!(from_disk.source(), built_in.source());
+    assert_ne!(built_in.source(), HandModel::load("two-finger").unwrap().source());
+}
+
+#[test]
+fn hands_that_no_firmware_can_be_built_with_are_refused() {
+    let gains = hand_text();
+    let (begin, end) = (gains.find("[control]").unwrap(), gains.find("[joint_defaults]").unwrap());
+    assert_eq!(
+        message(&gains[begin..end], ""),
+        "h.toml: control: the hand says nothing of its gains, which its firmware needs; add a table [control] with the \
+         keys that a scene's has: force_n, attitude_stiffness_nm, ..."
+    );
+    assert_eq!(
+        message("force_n = 5.0 ", "force_n = -5.0 "),
+        format!(
+            "h.toml:{}: control.force_n: -5.0 is out of range; has to be between 1e-6 and 10000.0",
+            line("force_n")
+        )
+    );
+    assert_eq!(
+        message("soft_start_s", "soft_start"),
+        format!(
+            "h.toml:{}: control.soft_start: unknown key; did you mean `soft_start_s`?",
+            line("soft_start_s")
+        )
+    );
+    assert_eq!(
+        message("axis = [0.0, 1.0, 0.0]", "axis = [0.0, 2.0, 0.0]"),
+        format!(
+            "h.toml:{}: joint.2.axis: joint `finger-1-flex-1`: axis has to be a unit vector; divide it by its length",
+            line("axis = [0.0, 1.0, 0.0]")
+        )
+    );
+    assert_eq!(
+        message("limits_rad = [-0.6, 0.6]", "limits_rad = [1e-9, 1.1e-9]"),
+        format!(
+            "h.toml:{}: joint.1.nominal_rad: 0.0 is outside the limits; has to be between 0.000000001 and 0.0000000011",
+            line("name = \"finger-1-abduct\"") - 1
+        )
+    );
+    assert_eq!(
+        message("schema = 1", "schema = 2"),
+        "h.toml:7: schema: 2 is a format that this program does not know; write it as format 1"
+    );
+    assert_eq!(
+        HandModel::load("four-finger").unwrap_err().to_string(),
+        "four-finger: no built-in hand is called `four-finger`; did you mean `two-finger`? (a path has to end in .toml or contain a /)"
+    );
+    assert_eq!(
+        HandModel::load("models/no.toml").unwrap_err().to_string(),
+        "models/no.toml: no such file; check the path"
+    );
+}
+
+#[test]
+fn gains_of_the_hand_do_not_act_in_a_scene() {
+    let error = load("cube", &["hand.control.force_n=3"]).unwrap_err().to_string();
+    assert_eq!(error, "--set: hand.control.force_n: acts in the firmware only; set control.force_n");
+    let scene = load("cube", &["control.force_n=3"]).unwrap();
+    assert_eq!(scene.controller_config().law.force_n, 3.0);
+    assert_eq!(scene.file.hand.control, None);
+}
