@@ -16,11 +16,13 @@ struct Cli {
 #[derive(Subcommand)]
 enum Command {
     Sim(commands::sim::Arguments),
+    Pil(commands::pil::Arguments),
 }
 
 fn main() -> ExitCode {
     let outcome = match Cli::parse().command {
         Command::Sim(arguments) => commands::sim::run(&arguments),
+        Command::Pil(arguments) => commands::pil::run(&arguments),
     };
     match outcome {
         Ok(commands::Outcome::Shown) => ExitCode::SUCCESS,
