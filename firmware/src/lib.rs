@@ -1,4 +1,50 @@
-//! The hand that this firmware is for.
+//! What runs on the STM32F405 around the shared [`Device`](blindgrasp_shared::device::Device): wiring, and drivers.
+//! What the hand does is decided there; here are pins, clocks, queues and interrupts.
+//!
+//! ```text
+//!  priority 3   USART2 --byte--+
+//!  priority 2   SysTick, 1 kHz |   control task: joints -> tick -> joints
+//!                              |        ^ packets         | records, replies
+//!  idle                        +--> link: frames to packets, replies to frames --> USART2
+//! ```
+//!
+//! Everything between two priorities is a bounded queue without locks ([`queue`]). Two images come of it: `hand`, with
+//! the joints of the board, and `pil` (processor in the loop), whose joints are at the other end of the link ([`pil`]).
+//!
+//! On the host only the parts without hardware are there, for their tests.
 #![no_std]
+#![warn(missing_docs)]
 
+#[cfg(test)]
+extern crate std;
+
+pub mod bus;
+pub mod control;
+pub mod joints;
+pub mod link;
 pub mod model;
+pub mod pil;
+pub mod queue;
+pub mod reset;
+
+#[cfg(target_os = "none")]
+pub mod bench;
+#[cfg(target_os = "none")]
+pub mod board;
+#[cfg(target_os = "none")]
+pub mod boot;
+#[cfg(target_os = "none")]
+pub mod clock;
+#[cfg(target_os = "none")]
+pub mod crash;
+#[cfg(target_os = "none")]
+pub mod report;
+#[cfg(target_os = "none")]
+pub mod schedule;
+#[cfg(target_os = "none")]
+pub mod semihosting;
+#[cfg(target_os = "none")]
+pub mod serial;
+
+#[cfg(target_os = "none")]
+use defmt_rtt as _;

@@ -11,6 +11,7 @@ pub type Hand = blindgrasp_shared::hand::Hand<f64, MAX_JOINTS, MAX_FINGERS>;
 /// A posture of a [`Hand`].
 pub type Posture = blindgrasp_shared::hand::Posture<f64, MAX_JOINTS, MAX_FINGERS>;
 
+#[cfg(feature = "command")]
 pub mod device;
 pub mod plant;
 pub mod record;

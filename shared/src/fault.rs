@@ -272,9 +272,12 @@ impl<T: Real, const J: usize> FaultConfig<T, J> {
             return Err(ParameterError { parameter: "faults.late_ticks", joint: None, reason });
         }
         for k in 0..joint_count {
-            if let Some(parent) = hand.parent(k) {
-                joints[k].before = Some(parent);
-                joints[parent].after = Some(k);
+            let parent = hand.parent(k);
+            if let Some(joint) = joints.get_mut(k) {
+                joint.before = parent;
+            }
+            if let Some(joint) = parent.and_then(|parent| joints.get_mut(parent)) {
+                joint.after = Some(k);
             }
         }
         let ticks = |time: Option<u32>, parameter| match time {

@@ -96,8 +96,8 @@ pub struct Identity<'a> {
 pub enum Clock {
     /// The crystal.
     External,
-    /// The internal oscillator, because the crystal did not start: a percent of error, and too slow for the tick. The
-    /// hand refuses to arm.
+    /// The internal oscillator, because the crystal did not start: its time is wrong by a percent or more. The hand
+    /// refuses to arm.
     Fallback,
     /// None: it is emulated.
     Emulated,

@@ -28,7 +28,7 @@ pub trait Real:
     /// Sine and cosine of an angle in radians.
     ///
     /// `f32`: absolute error below 2e-7 over `[-2 pi, 2 pi]` (a test samples 8 million arguments and prints the
-    /// largest error, 7.8e-8) and below 1e-6 up to 1,000 rad; NaN for infinities and NaN.
+    /// largest error, 1.2e-7) and below 1e-6 up to 1,000 rad; NaN for infinities and NaN.
     /// `f64`: libm's, below 1 ulp.
     fn sine_cosine(self) -> (Self, Self);
 
@@ -70,25 +70,23 @@ pub trait Real:
 impl Real for f32 {
     #[inline]
     fn sine_cosine(self) -> (f32, f32) {
-        // Cody-Waite reduction to [-pi/4, pi/4]: pi/2 in three parts, of which the first two have so few bits that
-        // their products with the quadrant number are exact for quadrants below 2^9.
+        // Cody-Waite reduction to [-pi/4, pi/4]: pi/2 in two parts, of which the first has so few bits that its product
+        // with the quadrant number is exact for quadrants below 2^16.
         const HALF_PI_HIGH: f32 = 1.570_312_5;
-        const HALF_PI_MIDDLE: f32 = 4.837_512_97e-4;
-        const HALF_PI_LOW: f32 = 7.549_790_13e-8;
+        const HALF_PI_LOW: f32 = 4.838_267_949e-4;
         // Adding 1.5 * 2^23 leaves the nearest whole number in the low bits of the mantissa.
         const ROUND: f32 = 12_582_912.0;
         let shifted = self * core::f32::consts::FRAC_2_PI + ROUND;
         let quadrant = shifted.to_bits();
         let turns = shifted - ROUND;
-        let r = ((self - turns * HALF_PI_HIGH) - turns * HALF_PI_MIDDLE) - turns * HALF_PI_LOW;
+        let r = (self - turns * HALF_PI_HIGH) - turns * HALF_PI_LOW;
         let r2 = r * r;
-        // Minimax polynomials on [-pi/4, pi/4] (S. L. Moshier, Cephes, sinf.c), error below 0.6 ulp before rounding.
-        let s = ((-1.951_529_6e-4 * r2 + 8.332_161e-3) * r2 - 1.666_665_5e-1) * r2 * r + r;
-        let c = ((2.443_315_7e-5 * r2 - 1.388_731_6e-3) * r2 + 4.166_664_6e-2) * r2 * r2 - 0.5 * r2 + 1.0;
-        let (s, c) = if quadrant & 1 == 0 { (s, c) } else { (c, s) };
-        let sine = if quadrant & 2 == 0 { s } else { -s };
-        let cosine = if quadrant.wrapping_add(1) & 2 == 0 { c } else { -c };
-        (sine, cosine)
+        // Minimax polynomials on [-pi/4, pi/4] by Remez' algorithm; before rounding, their errors are 2e-9 and 3.3e-8.
+        let s = ((-1.949_495e-4 * r2 + 8.331_973e-3) * r2 - 1.666_665_06e-1) * (r2 * r) + r;
+        let c = ((-1.359_724_7e-3 * r2 + 4.165_625_2e-2) * r2 - 4.999_989_3e-1) * r2 + 1.0;
+        // A quarter turn for bit 0 of the quadrant, half a turn for bit 1.
+        let (s, c) = if quadrant & 1 == 0 { (s, c) } else { (c, -s) };
+        if quadrant & 2 == 0 { (s, c) } else { (-s, -c) }
     }
 
     fn square_root(self) -> f32 {

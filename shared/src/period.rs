@@ -2,6 +2,7 @@
 
 use crate::math::Real;
 use crate::parameter::ParameterError;
+use core::num::NonZeroU32;
 
 /// Longest time that a setting may name, ms: an hour.
 const LONGEST_MS: u32 = 3_600_000;
@@ -9,7 +10,7 @@ const LONGEST_MS: u32 = 3_600_000;
 /// Time from one tick to the next.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Period {
-    microseconds: u32,
+    microseconds: NonZeroU32,
 }
 
 impl Period {
@@ -18,22 +19,23 @@ impl Period {
     /// # Errors
     /// A period below 100 us or above 100 ms.
     pub fn from_us(microseconds: u32) -> Result<Self, ParameterError> {
-        if (100..=100_000).contains(&microseconds) {
-            Ok(Self { microseconds })
-        } else {
-            let reason = "has to be from 100 to 100000";
-            Err(ParameterError { parameter: "period_us", joint: None, reason })
+        match NonZeroU32::new(microseconds) {
+            Some(microseconds) if (100..=100_000).contains(&microseconds.get()) => Ok(Self { microseconds }),
+            _ => {
+                let reason = "has to be from 100 to 100000";
+                Err(ParameterError { parameter: "period_us", joint: None, reason })
+            }
         }
     }
 
     /// The period, us.
     pub fn microseconds(self) -> u32 {
-        self.microseconds
+        self.microseconds.get()
     }
 
     /// The period, s.
     pub fn seconds<T: Real>(self) -> T {
-        T::from_i32(self.microseconds as i32) / T::from_i32(1_000_000)
+        T::from_i32(self.microseconds() as i32) / T::from_i32(1_000_000)
     }
 
     /// Ticks that a time in ms takes, rounded up.
@@ -48,7 +50,9 @@ impl Period {
                 reason: "has to be at most an hour (3600000)",
             });
         }
-        Ok((milliseconds * 1000).div_ceil(self.microseconds))
+        // Not `div_ceil`, which asks a divisor that can't be zero whether it is.
+        let whole = milliseconds * 1000 / self.microseconds;
+        Ok(whole + u32::from(milliseconds * 1000 % self.microseconds != 0))
     }
 }
 

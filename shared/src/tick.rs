@@ -61,6 +61,8 @@ struct Prepared<T, const J: usize> {
 }
 
 impl<T: Real, const J: usize> Prepared<T, J> {
+    /// Not inlined: the firmware would have it twice, at the start and where parameters are set.
+    #[inline(never)]
     fn new<const F: usize>(hand: &Hand<T, J, F>, config: &Config<T, J>) -> Result<Self, ParameterError> {
         let period = Period::from_us(config.period_us)?;
         let estimator = config.estimator.prepare(hand.joint_count(), period)?;

@@ -7,6 +7,7 @@
 //! - [`grasps`]: a hand, an object, a plant and the grasp law, ready to run.
 //! - [`numeric`]: derivatives by differences, and the largest of many errors.
 //! - [`polyhedra`]: random convex polyhedra, and scenes in which the hand grasps them.
+//! - [`thumb`]: what the functions of an image for the microcontroller call, and how much stack they take.
 
 pub mod description;
 pub mod grasps;
@@ -14,3 +15,4 @@ pub mod hands;
 pub mod numeric;
 pub mod polyhedra;
 pub mod random;
+pub mod thumb;

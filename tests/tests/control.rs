@@ -283,7 +283,7 @@ fn two_fingers_are_neighbours_twice() {
     let posture = case.posture(&case.angles);
     let wrenches = case.law.attitude_wrenches(&case.hand, &posture, &case.latch());
     let expected =
-        posture.links[0].axis() * (-4.0 * K_ST_NM * blindgrasp_shared::math::Real::sine_cosine(0.4).0);
+        posture.link(0).axis() * (-4.0 * K_ST_NM * blindgrasp_shared::math::Real::sine_cosine(0.4).0);
     // A few roundings of numbers of the size of `4 K_st`.
     assert!((wrenches[0].moment_nm - expected).norm() < 1e-14, "{} {expected}", wrenches[0].moment_nm);
     assert!((wrenches[1].moment_nm + expected).norm() < 1e-14);

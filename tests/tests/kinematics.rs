@@ -1,7 +1,7 @@
 //! Kinematics of the hand: against finite differences, against a second forward kinematics written straight from the
 //! description, and in `f32` against `f64`.
 
-use blindgrasp_shared::hand::{Hand, Posture, Wrench};
+use blindgrasp_shared::hand::{Fingertip, Hand, Joint, Link, Posture, Wrench};
 use blindgrasp_shared::math::Real;
 use blindgrasp_tests::description::{Description, axial};
 use blindgrasp_tests::numeric::{Errors, derivative};
@@ -89,7 +89,7 @@ fn prepared_frames_place_what_the_description_says() {
         let (here, expected) = (posture(&hand, &angles), description.placed(&angles));
         let (zero, expected_zero) = (posture(&hand, &[0.0; JOINTS]), description.placed(&[0.0; JOINTS]));
         for k in 0..hand.joint_count() {
-            let (pose, link) = (&here.links[k], hand.link(k));
+            let (pose, link) = (here.link(k), hand.link(k));
             errors.add((pose.origin_m - expected.origins_m[k]).norm());
             errors.add((pose.axis() - expected.axes[k]).norm());
             errors.add((pose.point(&link.mass_centre_m) - expected.mass_centres_m[k]).norm());
@@ -165,10 +165,12 @@ fn joint_torques_are_transposed_jacobians_times_wrenches() {
 
 /// The controller computes in `f32` what the tests above prove in `f64`.
 ///
-/// Bound, with `u` = 2^-24 (half the machine epsilon), `n` the length of the chain and `L` its reach:
-/// - Each joint adds an error to the attitude (Frobenius norm) of at most `sqrt(3) u` for the rounded constants,
-///   `9 u` for the product of two rotations, `2 * 3.4 u` for sine and cosine (their stated 2e-7 is 3.4 `u`) and
-///   `4 u` for turning the axes: `22 u` in all, `22 n u` along the chain.
+/// Bound, with `u` = 2^-24 (half the machine epsilon), `n` the number of joints to the fingertip and `L` its reach:
+/// - Each planar chain adds an error to the attitude (Frobenius norm) of at most `sqrt(3) u` for the rounded constants of
+///   its bend, `3 u` for adding the parent's angle to it, `6 u` for the two turns of the axes, `2 * 3.4 u` for sine and
+///   cosine (their stated 2e-7 is 3.4 `u`) and `4 u` for turning the link: `22 u` in all. Each further joint of
+///   the chain adds a rounding of the sum of angles: `8 u` up to four half turns (two joints), `16 u` up to ten (five),
+///   in two axes `sqrt(2)` of that. That sums to at most `22 n u` for chains of up to five.
 /// - An origin inherits `22 k u` of each bone before it and adds `7 u` of the bone for rounding and `u L` for the sum:
 ///   `(23 n + 7) u L` for a fingertip's centre.
 /// - A column of `J` is an axis (error `22 n u`) times a lever (length up to `2 L`, an error of two positions): with
@@ -237,4 +239,137 @@ fn axes_near_the_parents_are_no_special_case() {
     }
     println!("axes near the parent's: {errors}");
     assert!(errors.largest() < 1e-13);
+}
+
+/// How a joint stands to its parent in [`bundle`], and how often it does.
+#[derive(Debug, Default)]
+struct Kinds {
+    parallel: usize,
+    antiparallel: usize,
+    /// Another joint already follows the parent.
+    branching: usize,
+    /// At its parent's origin.
+    coincident: usize,
+    /// Along the parent's axis.
+    axial: usize,
+}
+
+/// A hand of parallel, antiparallel and other joints in every combination: joints at one point or shifted along the axis,
+/// chains of one, branches from the middle of a chain, and fingertips in the middle of a chain.
+fn bundle(draw: &mut Draw, kinds: &mut Kinds) -> Description {
+    let mut hand = Description::default();
+    for k in 0..draw.count(4..=20) {
+        let leaves = (0..k).filter(|&j| hand.joints.iter().all(|joint| joint.parent != Some(j))).count();
+        let parent = match k.checked_sub(1) {
+            Some(last) if leaves < FINGERS - 1 && draw.chance(0.2) => Some(draw.count(0..=last)),
+            last => last,
+        };
+        let taken = parent.is_some_and(|p| hand.joints.iter().any(|joint| joint.parent == Some(p)));
+        kinds.branching += usize::from(taken);
+        let attitude = if draw.chance(0.5) { Matrix3::identity() } else { draw.rotation() };
+        let below = parent.map_or(Vector3::z(), |parent| hand.joints[parent].axis);
+        let axis: Vector3<f64> = match draw.count(0..=9) {
+            0..6 => {
+                kinds.parallel += 1;
+                attitude.transpose() * below
+            }
+            6 => {
+                kinds.antiparallel += 1;
+                attitude.transpose() * -below
+            }
+            _ => draw.unit(),
+        };
+        let offset_m = match draw.count(0..=3) {
+            0 => {
+                kinds.coincident += 1;
+                Vector3::zeros()
+            }
+            1 => {
+                kinds.axial += 1;
+                below * draw.within(-0.1, 0.1)
+            }
+            _ => draw.vector(0.1),
+        };
+        let mass_kg = if draw.chance(0.3) { 0.0 } else { draw.within(0.01, 0.3) };
+        hand.joints.push(Joint {
+            parent,
+            offset_m,
+            attitude,
+            axis: axis.normalize(),
+            lower_rad: -PI,
+            upper_rad: PI,
+            link: Link {
+                mass_kg,
+                mass_centre_m: draw.vector(0.05),
+                inertia_kg_m2: draw.inertia(mass_kg, 0.1),
+            },
+        });
+    }
+    let leaves = (0..hand.joints.len()).filter(|&j| hand.joints.iter().all(|joint| joint.parent != Some(j)));
+    let mut links: Vec<usize> = leaves.collect();
+    while links.len() < 2 || (links.len() < FINGERS && draw.chance(0.3)) {
+        links.push(draw.count(0..=hand.joints.len() - 1));
+    }
+    for link in links {
+        let tip = Fingertip { link, offset_m: draw.vector(0.05), radius_m: 0.01 };
+        hand.fingertips.push(tip);
+    }
+    hand
+}
+
+/// Places and torques of hands of planar chains, against the second forward kinematics and against moments about
+/// each joint's axis, summed up over everything that the joint moves.
+///
+/// Tolerance: 1e-13 m and 1e-13 of the loads: chains of up to twenty joints, with some ten roundings each.
+#[test]
+fn planar_chains_are_no_special_case() {
+    let (mut places, mut torques) = (Errors::new(), Errors::new());
+    let mut kinds = Kinds::default();
+    let mut draw = Draw::new(6);
+    for _ in 0..1000 {
+        let description = bundle(&mut draw, &mut kinds);
+        let hand: RandomHand = description.hand();
+        let angles = draw.joints::<JOINTS>(PI);
+        let gravity = draw.vector(9.81);
+        let wrenches: [Wrench<f64>; FINGERS] =
+            std::array::from_fn(|_| Wrench { force_n: draw.vector(5.0), moment_nm: draw.vector(0.2) });
+        let (here, expected) = (posture(&hand, &angles), description.placed(&angles));
+        let (zero, expected_zero) = (posture(&hand, &[0.0; JOINTS]), description.placed(&[0.0; JOINTS]));
+        let pushed = hand.fingertip_torques(&here, &wrenches);
+        let held = hand.gravity_torques(&here, &gravity);
+        for (i, tip) in description.fingertips.iter().enumerate() {
+            places.add((here.centres_m[i] - expected.centres_m[i]).norm());
+            let turn = here.attitudes[i] * zero.attitudes[i].transpose();
+            let expected = expected.attitudes[tip.link] * expected_zero.attitudes[tip.link].transpose();
+            places.add((turn - expected).norm());
+        }
+        for k in 0..description.joints.len() {
+            let (pose, axis, origin) = (here.link(k), expected.axes[k], expected.origins_m[k]);
+            places.add((pose.origin_m - origin).norm());
+            places.add((pose.axis() - axis).norm());
+            let moves = |link: usize| description.chain(link).any(|below| below == k);
+            let (mut push, mut hold, mut scale) = (0.0, 0.0, 0.0);
+            for (tip, (centre, wrench)) in
+                description.fingertips.iter().zip(expected.centres_m.iter().zip(&wrenches))
+            {
+                if moves(tip.link) {
+                    push += axis.dot(&(wrench.moment_nm + (centre - origin).cross(&wrench.force_n)));
+                }
+                scale += wrench.moment_nm.norm() + wrench.force_n.norm();
+            }
+            for (link, (joint, centre)) in description.joints.iter().zip(&expected.mass_centres_m).enumerate()
+            {
+                if moves(link) {
+                    hold -= axis.dot(&(centre - origin).cross(&(gravity * joint.link.mass_kg)));
+                }
+                scale += joint.link.mass_kg * gravity.norm();
+            }
+            torques.add((pushed[k] - push) / scale);
+            torques.add((held[k] - hold) / scale);
+        }
+    }
+    println!("planar chains: places {places}; torques, relative {torques}; {kinds:?}");
+    assert!(places.largest() < 1e-13 && torques.largest() < 1e-13);
+    let Kinds { parallel, antiparallel, branching, coincident, axial } = kinds;
+    assert!([parallel, antiparallel, branching, coincident, axial].into_iter().all(|count| count > 500));
 }

@@ -1,22 +1,20 @@
 //! Firmware on a microcontroller, real or emulated.
 //!
-//! From the ground up: [`interrupt`], whether the user wants an end; [`transport`], bytes to and from; `qemu`, the
-//! emulator as a process; [`client`], messages and answers; [`twin`], the firmware's double on the host; [`pil`], a hand
-//! in a simulation whose controller is the firmware; [`build`], where its image comes from.
+//! - [`image`]: what is in an image's file; [`build`]: where an image for processor in the loop comes from;
+//!   `flash` (feature `probe`): images onto a chip.
+//! - Processor in the loop, from the ground up: [`interrupt`], whether the user wants an end; [`transport`], bytes to and
+//!   from; `qemu`, the emulator as a process; [`client`], messages and answers; [`twin`], the firmware's double on the host;
+//!   [`compare`], whether they are one; [`pil`], a hand in a simulation whose controller is the firmware.
 
-#[cfg(feature = "command")]
 pub mod build;
-#[cfg(feature = "command")]
 pub mod client;
-#[cfg(feature = "command")]
 pub mod compare;
-#[cfg(feature = "command")]
+#[cfg(feature = "probe")]
+pub mod flash;
+pub mod image;
 pub mod interrupt;
-#[cfg(feature = "command")]
 pub mod pil;
-#[cfg(all(feature = "command", unix))]
+#[cfg(unix)]
 pub mod qemu;
-#[cfg(feature = "command")]
 pub mod transport;
-#[cfg(feature = "command")]
 pub mod twin;

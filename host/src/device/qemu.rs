@@ -3,9 +3,9 @@
 //! It gets a process group of its own, which is killed when the value is dropped, and a folder of its own for pipes and
 //! sockets, which is removed then. If this process is killed itself, the firmware finds its pipe closed and ends QEMU.
 
+use super::image::Firmware;
 use super::interrupt;
 use super::transport::{Streams, Transport, TransportError};
-use blindgrasp_shared::identity::Image;
 use nix::fcntl::OFlag;
 use nix::sys::signal::{Signal, killpg};
 use nix::sys::stat::Mode;
@@ -112,15 +112,12 @@ impl Qemu {
             Ok(bytes) => bytes,
             Err(error) => return fail(error.to_string()),
         };
-        if !bytes.starts_with(b"\x7fELF") {
-            return fail("this is no ELF file".to_owned());
-        }
-        match Image::find(&bytes) {
-            None => return fail("this is no firmware of blindgrasp".to_owned()),
-            Some(image) if image.kind != "pil" => {
+        match Firmware::parse(&bytes) {
+            Err(error) => return fail(error.to_string()),
+            Ok(Firmware { image, .. }) if image.kind != "pil" => {
                 return fail(format!("this is {image}: a simulation needs the image `pil`"));
             }
-            Some(_) => {}
+            Ok(_) => {}
         }
         let image = match fs::canonicalize(image) {
             Ok(image) => image,

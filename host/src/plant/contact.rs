@@ -114,8 +114,9 @@ impl Contact {
     /// What joint `k` of the finger contributes to each row; see [`Rows`].
     #[inline]
     pub fn joint_rows(&self, posture: &Posture, centre_m: &Vector3<f64>, k: usize) -> [f64; 4] {
-        let axis = posture.links[k].axis();
-        let linear = self.frame.tr_mul(&axis.cross(&(centre_m - posture.links[k].origin_m)));
+        let pose = posture.link(k);
+        let axis = pose.axis();
+        let linear = self.frame.tr_mul(&axis.cross(&(centre_m - pose.origin_m)));
         let angular = self.frame.tr_mul(&axis);
         let rho = self.rolling_radius_m;
         [rho * angular.z - linear.x, -rho * angular.x - linear.z, linear.y, -angular.y]

@@ -33,7 +33,7 @@ const ZERO_INERTIA: Matrix3<f64> = Matrix3::new(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.
 /// Places the hand's links.
 pub fn place_bodies(hand: &Hand, posture: &Posture, bodies: &mut [Body; MAX_JOINTS]) {
     for k in 0..hand.joint_count() {
-        let (link, pose) = (hand.link(k), &posture.links[k]);
+        let (link, pose) = (hand.link(k), posture.link(k));
         bodies[k] = Body {
             mass_kg: link.mass_kg,
             centre_m: pose.point(&link.mass_centre_m),
@@ -60,13 +60,13 @@ pub fn mass_matrix(hand: &Hand, posture: &Posture, bodies: &[Body; MAX_JOINTS], 
             below.2 += inertia;
         }
         // Momentum of what joint j carries when it turns at unit speed, and its moment about each axis below.
-        let pose = &posture.links[j];
+        let pose = posture.link(j);
         let axis = pose.axis();
         let linear = axis.cross(&(moment - pose.origin_m * mass));
         let angular = inertia * axis - moment.cross(&axis.cross(&pose.origin_m));
         let mut below = Some(j);
         while let Some(k) = below {
-            let pose = &posture.links[k];
+            let pose = posture.link(k);
             let entry = pose.axis().dot(&(angular - pose.origin_m.cross(&linear)));
             h[j][k] = entry;
             h[k][j] = entry;
@@ -108,7 +108,7 @@ pub fn bias_torques(
     let mut forces = [Vector3::zeros(); MAX_JOINTS];
     let mut moments = [Vector3::zeros(); MAX_JOINTS];
     for k in 0..hand.joint_count() {
-        let pose = &posture.links[k];
+        let pose = posture.link(k);
         let parent = hand.parent(k).map_or(still, |parent| motions[parent]);
         let lever = pose.origin_m - parent.origin;
         let turning = pose.axis() * speeds_rad_s[k];
@@ -133,7 +133,7 @@ pub fn bias_torques(
     }
     let mut torques = [0.0; MAX_JOINTS];
     for k in (0..hand.joint_count()).rev() {
-        let pose = &posture.links[k];
+        let pose = posture.link(k);
         torques[k] = pose.axis().dot(&(moments[k] - pose.origin_m.cross(&forces[k])));
         if let Some(parent) = hand.parent(k) {
             forces[parent] += forces[k];

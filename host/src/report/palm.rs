@@ -24,7 +24,7 @@ impl Palm {
         links
             .filter_map(|link| {
                 let joints = (0..hand.joint_count()).filter(|&k| hand.parent(k) == link);
-                let bases: Vec<Vector3<f64>> = joints.map(|k| posture.links[k].origin_m).collect();
+                let bases: Vec<Vector3<f64>> = joints.map(|k| posture.link(k).origin_m).collect();
                 (bases.len() > 1).then(|| Self::through(&bases, &tips).carried_by(link, posture))
             })
             .collect()
@@ -52,7 +52,7 @@ impl Palm {
     }
 
     fn carried_by(self, link: Option<usize>, posture: &Posture) -> Self {
-        let Some(pose) = link.and_then(|link| posture.links.get(link)) else { return self };
+        let Some(pose) = link.map(|link| posture.link(link)) else { return self };
         let to_link = pose.attitude.transpose();
         let (centre_m, normal) = (to_link * (self.centre_m - pose.origin_m), to_link * self.normal);
         Self { link, centre_m, normal, ..self }
@@ -60,7 +60,7 @@ impl Palm {
 
     /// Centre (m) and normal in the base frame.
     pub(super) fn placed(&self, posture: &Posture) -> (Vector3<f64>, Vector3<f64>) {
-        match self.link.and_then(|link| posture.links.get(link)) {
+        match self.link.map(|link| posture.link(link)) {
             Some(pose) => (pose.point(&self.centre_m), pose.attitude * self.normal),
             None => (self.centre_m, self.normal),
         }

@@ -37,7 +37,7 @@ impl Sizes {
 
 /// Adds the hand to a mesh.
 pub(super) fn add(mesh: &mut Mesh, hand: &Hand, posture: &Posture, sizes: &Sizes, palms: &[Palm]) {
-    let origin = |k: usize| posture.links[k].origin_m;
+    let origin = |k: usize| posture.link(k).origin_m;
     for joint in 0..hand.joint_count() {
         let parent = hand.parent(joint);
         // Links that start from a plate lie in it.

@@ -220,14 +220,14 @@ pub(super) fn moving_masses(file: &HandFile, hand: &Hand, angles: &[f64]) -> Res
     let mut mass = DMatrix::<f64>::zeros(count, count);
     for link in 0..count {
         let body = hand.link(link);
-        let pose = &posture.links[link];
+        let pose = posture.link(link);
         let centre = pose.point(&body.mass_centre_m);
         let inertia = pose.attitude * body.inertia_kg_m2 * pose.attitude.transpose();
         let chain: Vec<usize> = std::iter::successors(Some(link), |&k| hand.parent(k)).collect();
         for &a in &chain {
             for &b in &chain {
-                let (axis_a, axis_b) = (posture.links[a].axis(), posture.links[b].axis());
-                let speed = |k: usize, axis: &Vector3<f64>| axis.cross(&(centre - posture.links[k].origin_m));
+                let (axis_a, axis_b) = (posture.link(a).axis(), posture.link(b).axis());
+                let speed = |k: usize, axis: &Vector3<f64>| axis.cross(&(centre - posture.link(k).origin_m));
                 mass[(a, b)] += body.mass_kg * speed(a, &axis_a).dot(&speed(b, &axis_b))
                     + axis_a.dot(&(inertia * axis_b));
             }

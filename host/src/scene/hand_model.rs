@@ -123,11 +123,13 @@ pub const JOINTS: usize = {count};
 /// Fingertips of the hand.
 pub const FINGERS: usize = {};
 /// The hand `{}`, prepared.
+#[allow(clippy::approx_constant, clippy::excessive_precision)]
 pub static HAND: Hand<f32, JOINTS, FINGERS> = match Hand::from_prepared({}, {}) {{
     Ok(hand) => hand,
     Err(_) => panic!(\"the joints are no tree\"),
 }};
 /// Its gains, limits and times.
+#[allow(clippy::approx_constant, clippy::excessive_precision)]
 pub static CONFIG: Config<f32, JOINTS> = {};
 ",
             fingertips.len(),

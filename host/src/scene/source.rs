@@ -5,7 +5,7 @@
 use blindgrasp_shared::control::GraspConfig;
 use blindgrasp_shared::estimate::{Encoder, EstimatorConfig};
 use blindgrasp_shared::fault::{FaultConfig, FrozenConfig};
-use blindgrasp_shared::hand::{Fingertip, Link, PreparedJoint};
+use blindgrasp_shared::hand::{Bend, Fingertip, Link, PreparedJoint};
 use blindgrasp_shared::limit::{LimitConfig, StopConfig};
 use blindgrasp_shared::supervisor::SupervisorConfig;
 use blindgrasp_shared::tick::Config;
@@ -16,7 +16,7 @@ pub(super) const IMPORTS: &str = "\
 use blindgrasp_shared::control::GraspConfig;
 use blindgrasp_shared::estimate::{Encoder, EstimatorConfig};
 use blindgrasp_shared::fault::{FaultConfig, FrozenConfig};
-use blindgrasp_shared::hand::{Fingertip, Hand, Link, PreparedJoint};
+use blindgrasp_shared::hand::{Bend, Fingertip, Hand, Link, PreparedJoint};
 use blindgrasp_shared::limit::{LimitConfig, StopConfig};
 use blindgrasp_shared::supervisor::SupervisorConfig;
 use blindgrasp_shared::tick::Config;
@@ -108,8 +108,9 @@ macro_rules! structs {
 structs! {
     impl [] Link<f32> as Link { mass_kg mass_centre_m inertia_kg_m2 }
     impl [] Fingertip<f32> as Fingertip { link offset_m radius_m }
+    impl [] Bend<f32> as Bend { turn_sine turn_cosine twist_sine twist_cosine }
     impl [] PreparedJoint<f32> as PreparedJoint {
-        parent offset_m attitude from_link lower_rad upper_rad link first_moment_kg_m carried_kg
+        parent bend offset_m from_link lower_rad upper_rad link first_moment_kg_m
     }
     impl [] Encoder<f32> as Encoder { zero_count rad_per_count reversed }
     impl [const J: usize] EstimatorConfig<f32, J> as EstimatorConfig { bandwidth_hz encoders }

@@ -19,7 +19,7 @@
 //! - `V_st` has the constant `3 N K_st` added, so that it is zero at the latch and never negative: the energy is then
 //!   bounded for every `K_st`, and the condition of Eq. 49 is a sizing rule only.
 
-use crate::hand::frame::product_transposed;
+use crate::hand::frame::{dot, product_transposed};
 use crate::hand::{Hand, Posture, Wrench};
 use crate::math::Real;
 use crate::parameter::ParameterError;
@@ -53,8 +53,8 @@ impl<T: Real, const J: usize> GraspConfig<T, J> {
         if !positive_or_zero(self.attitude_stiffness_nm) {
             return fail("attitude_stiffness_nm", None, "has to be zero or positive");
         }
-        let damping = &self.damping_nm_s[..hand.joint_count()];
-        if let Some(joint) = damping.iter().position(|&c| !positive_or_zero(c)) {
+        let mut damping = self.damping_nm_s.iter().take(hand.joint_count());
+        if let Some(joint) = damping.position(|&c| !positive_or_zero(c)) {
             return fail("damping_nm_s", Some(joint), "has to be zero or positive");
         }
         if self.gravity_m_s2.is_some_and(|g| !g.iter().all(|v| v.is_finite())) {
@@ -151,24 +151,26 @@ impl<T: Real, const J: usize> GraspLaw<T, J> {
         speeds_rad_s: &[T; J],
         grip: Option<Grip<'_, T, F>>,
     ) -> ([T; J], Monitor<T>) {
-        let mut wrenches = [Wrench::zero(); F];
+        let mut torques = core::array::from_fn(|k| -(self.damping_nm_s[k] * speeds_rad_s[k]));
         let mut monitor = Monitor { approach_potential_j: T::zero(), attitude_potential_j: T::zero() };
         if let Some(grip) = grip {
+            let (moments_nm, potential_j) = if grip.attitude_stiffness_nm > T::zero() {
+                hold_attitudes(hand, posture, grip.latch, grip.attitude_stiffness_nm)
+            } else {
+                ([Vector3::zeros(); F], T::zero())
+            };
+            monitor.attitude_potential_j = potential_j;
             let stiffness = grip.force_n * self.per_radii_1_m;
-            monitor.approach_potential_j = self.approach(hand, posture, stiffness, &mut wrenches);
-            if grip.attitude_stiffness_nm > T::zero() {
-                monitor.attitude_potential_j =
-                    hold_attitudes(hand, posture, grip.latch, grip.attitude_stiffness_nm, &mut wrenches);
+            let mut squares = T::zero();
+            for (i, (away, moment_nm)) in self.centroid_offsets(hand, posture).zip(moments_nm).enumerate() {
+                squares += dot(&away, &away);
+                let wrench = Wrench { force_n: away * stiffness, moment_nm };
+                hand.push_fingertip(posture, i, &wrench, &mut torques);
             }
+            monitor.approach_potential_j = squares * stiffness * T::from_f64(0.5);
         }
-        let mut torques = hand.fingertip_torques(posture, &wrenches);
         if let Some(gravity) = &self.gravity_m_s2 {
-            for (torque, weight) in torques.iter_mut().zip(hand.gravity_torques(posture, gravity)) {
-                *torque += weight;
-            }
-        }
-        for ((torque, speed), damping) in torques.iter_mut().zip(speeds_rad_s).zip(&self.damping_nm_s) {
-            *torque -= *damping * *speed;
+            hand.hold_weight(posture, gravity, &mut torques);
         }
         (torques, monitor)
     }
@@ -180,7 +182,9 @@ impl<T: Real, const J: usize> GraspLaw<T, J> {
         posture: &Posture<T, J, F>,
     ) -> [Wrench<T>; F] {
         let mut wrenches = [Wrench::zero(); F];
-        self.approach(hand, posture, self.approach_stiffness_n_m(), &mut wrenches);
+        for (wrench, away) in wrenches.iter_mut().zip(self.centroid_offsets(hand, posture)) {
+            wrench.force_n = away * self.approach_stiffness_n_m();
+        }
         wrenches
     }
 
@@ -191,59 +195,59 @@ impl<T: Real, const J: usize> GraspLaw<T, J> {
         posture: &Posture<T, J, F>,
         latch: &Latch<T, F>,
     ) -> [Wrench<T>; F] {
-        let mut wrenches = [Wrench::zero(); F];
-        hold_attitudes(hand, posture, latch, self.attitude_stiffness_nm, &mut wrenches);
-        wrenches
+        let (moments_nm, _) = hold_attitudes(hand, posture, latch, self.attitude_stiffness_nm);
+        moments_nm.map(|moment_nm| Wrench { force_n: Vector3::zeros(), moment_nm })
     }
 
-    /// Adds the pull of each fingertip centre towards the centroid (Eqs. 30, 31) and returns its potential (Eq. 43),
-    /// which is `A / 2` times the sum of the squared distances from the centroid.
-    fn approach<const F: usize>(
+    /// From the centre of each fingertip to the centroid (Eq. 31), m. The potential of Eq. 43 is `A / 2` times the sum of
+    /// their squares.
+    fn centroid_offsets<'a, const F: usize>(
         &self,
         hand: &Hand<T, J, F>,
-        posture: &Posture<T, J, F>,
-        stiffness_n_m: T,
-        wrenches: &mut [Wrench<T>; F],
-    ) -> T {
-        let centres = || posture.centres_m.iter().take(hand.fingertip_count());
-        let centroid = centres().fold(Vector3::zeros(), |sum, centre| sum + centre) * self.share_of_one;
-        let mut squares = T::zero();
-        for (wrench, centre) in wrenches.iter_mut().zip(centres()) {
-            let away = centroid - centre;
-            squares += away.dot(&away);
-            wrench.force_n += away * stiffness_n_m;
-        }
-        squares * stiffness_n_m * T::from_f64(0.5)
+        posture: &'a Posture<T, J, F>,
+    ) -> impl Iterator<Item = Vector3<T>> + use<'a, T, J, F> {
+        let centres = posture.centres_m.iter().take(hand.fingertip_count());
+        let centroid = centres.clone().fold(Vector3::zeros(), |sum, centre| sum + centre) * self.share_of_one;
+        centres.map(move |centre| centroid - centre)
     }
 }
 
-/// Adds the moments that hold the relative attitudes (Eq. 32) and returns their potential (Eq. 44, above its least
-/// value).
+/// The moments that hold the relative attitudes (Eq. 32), N m, and their potential (Eq. 44, above its least value), J.
 fn hold_attitudes<T: Real, const J: usize, const F: usize>(
     hand: &Hand<T, J, F>,
     posture: &Posture<T, J, F>,
     latch: &Latch<T, F>,
     stiffness_nm: T,
-    wrenches: &mut [Wrench<T>; F],
-) -> T {
-    let count = hand.fingertip_count().min(F);
+) -> ([Vector3<T>; F], T) {
     // How far each fingertip turned since the latch, D_i.
-    let mut turns = [Matrix3::identity(); F];
-    for (turn, (now, then)) in
-        turns.iter_mut().zip(posture.attitudes.iter().zip(&latch.attitudes)).take(count)
-    {
-        *turn = product_transposed(now, then);
-    }
+    let turns: [Matrix3<T>; F] =
+        core::array::from_fn(|i| product_transposed(&posture.attitudes[i], &latch.attitudes[i]));
     let mut missing_traces = T::zero();
-    for i in 0..count {
-        let next = if i + 1 == count { 0 } else { i + 1 };
-        let (axial, trace) = axial_and_trace(&turns[i], &turns[next]);
+    // What one fingertip feels from its neighbour; the neighbour feels the opposite.
+    let mut pull = |from: &Matrix3<T>, towards: &Matrix3<T>| {
+        let (axial, trace) = axial_and_trace(from, towards);
         missing_traces += T::from_i32(3) - trace;
-        let moment = axial * stiffness_nm;
-        wrenches[i].moment_nm += moment;
-        wrenches[next].moment_nm -= moment;
-    }
-    missing_traces * stiffness_nm
+        axial * stiffness_nm
+    };
+    let count = hand.fingertip_count();
+    let around = match (turns.first(), turns.get(count.wrapping_sub(1))) {
+        (Some(first), Some(last)) => pull(last, first),
+        _ => Vector3::zeros(),
+    };
+    let mut behind = around;
+    let moments_nm = core::array::from_fn(|i| {
+        if i >= count {
+            return Vector3::zeros();
+        }
+        let ahead = match turns.get(i + 1) {
+            Some(next) if i + 1 < count => pull(&turns[i], next),
+            _ => around,
+        };
+        let moment = ahead - behind;
+        behind = ahead;
+        moment
+    });
+    (moments_nm, missing_traces * stiffness_nm)
 }
 
 /// Axial vector and trace of `a b^T`: the sum of the cross products of the columns of `a` with those of `b`, and the

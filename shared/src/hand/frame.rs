@@ -1,6 +1,7 @@
 //! Products of rotations and vectors, written out. nalgebra's own go through its general product, which for matrices of
 //! this size costs several times their arithmetic; this is the inner loop of the tick.
 
+use super::model::Bend;
 use crate::math::Real;
 use nalgebra::{Matrix3, Vector3};
 
@@ -50,6 +51,80 @@ pub(crate) fn turn_about_z<T: Real>(f: &Matrix3<T>, sine: T, cosine: T) -> Matri
         y(f.m31, f.m32),
         f.m33,
     )
+}
+
+impl<T: Real> Bend<T> {
+    /// The bend from the axes of the parent's chain, against which the parent's link is turned by an angle of this sine
+    /// and cosine.
+    #[inline]
+    pub(super) fn after(&self, sine: T, cosine: T) -> Self {
+        Self {
+            turn_sine: self.turn_sine * cosine + self.turn_cosine * sine,
+            turn_cosine: self.turn_cosine * cosine - self.turn_sine * sine,
+            ..*self
+        }
+    }
+
+    /// A vector given in the old axes, in the new ones.
+    #[inline]
+    pub(super) fn into_new(self, v: &Vector3<T>) -> Vector3<T> {
+        let normal = v.y * self.turn_cosine - v.x * self.turn_sine;
+        Vector3::new(
+            v.x * self.turn_cosine + v.y * self.turn_sine,
+            normal * self.twist_cosine + v.z * self.twist_sine,
+            v.z * self.twist_cosine - normal * self.twist_sine,
+        )
+    }
+
+    /// A vector given in the new axes, in the old ones.
+    #[inline]
+    pub(super) fn into_old(self, v: &Vector3<T>) -> Vector3<T> {
+        let normal = v.y * self.twist_cosine - v.z * self.twist_sine;
+        Vector3::new(
+            v.x * self.turn_cosine - normal * self.turn_sine,
+            v.x * self.turn_sine + normal * self.turn_cosine,
+            v.y * self.twist_sine + v.z * self.twist_cosine,
+        )
+    }
+
+    /// The new axes in the old ones, as columns.
+    #[inline]
+    pub(super) fn axes(&self) -> Matrix3<T> {
+        let Self { turn_sine, turn_cosine, twist_sine, twist_cosine } = *self;
+        Matrix3::new(
+            turn_cosine,
+            -turn_sine * twist_cosine,
+            turn_sine * twist_sine,
+            turn_sine,
+            turn_cosine * twist_cosine,
+            -turn_cosine * twist_sine,
+            T::zero(),
+            twist_sine,
+            twist_cosine,
+        )
+    }
+
+    /// The new axes in whatever axes the old ones are given.
+    #[inline]
+    pub(super) fn turn_axes(self, old: &Matrix3<T>) -> Matrix3<T> {
+        let row = |x: T, y: T, z: T| self.into_new(&Vector3::new(x, y, z));
+        let x = row(old.m11, old.m12, old.m13);
+        let y = row(old.m21, old.m22, old.m23);
+        let z = row(old.m31, old.m32, old.m33);
+        Matrix3::new(x.x, x.y, x.z, y.x, y.y, y.z, z.x, z.y, z.z)
+    }
+}
+
+/// First column.
+#[inline]
+pub(crate) fn x_axis<T: Real>(m: &Matrix3<T>) -> Vector3<T> {
+    Vector3::new(m.m11, m.m21, m.m31)
+}
+
+/// Second column.
+#[inline]
+pub(crate) fn y_axis<T: Real>(m: &Matrix3<T>) -> Vector3<T> {
+    Vector3::new(m.m12, m.m22, m.m32)
 }
 
 /// Third column.

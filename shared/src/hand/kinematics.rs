@@ -1,6 +1,14 @@
 //! Forward kinematics, fingertip Jacobians (Eq. 11), and products with their transposes.
+//!
+//! The joints of a finger that flex are parallel. Such a **planar chain** has axes of its own, z along its joints, and in
+//! these everything is plane geometry: angles add up, links turn in the plane, and every joint sees the same force in
+//! the plane and the same moment about z, of which its torque takes its own lever. Only where a chain starts is a frame
+//! computed in space. A joint without parallel neighbours is a chain of one.
+//!
+//! Positions and moments are taken from the base's origin, also in a chain's axes, so that nothing has to be shifted from
+//! one point to another.
 
-use super::frame::{cross, dot, product, turn_about_z, turn_vector, z_axis};
+use super::frame::{cross, dot, turn_about_z, turn_vector, x_axis, y_axis, z_axis};
 use super::model::Hand;
 use crate::math::Real;
 use nalgebra::{Matrix3, SMatrix, Vector3};
@@ -29,10 +37,14 @@ impl<T: Real> LinkPose<T> {
 }
 
 /// Where everything is for one set of joint angles.
+///
+/// Joints are kept in the axes of their planar chain, where they only turn in the plane; [`link`](Self::link) puts the
+/// pose of a link in the base frame together.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Posture<T, const J: usize, const F: usize> {
-    /// One a joint.
-    pub links: [LinkPose<T>; J],
+    /// Axes of each planar chain in the base frame, as columns; by the first joint of the chain.
+    chains: [Matrix3<T>; J],
+    joints: [JointPose<T>; J],
     /// Centre `x_i` of each fingertip, m.
     pub centres_m: [Vector3<T>; F],
     /// Attitude `R_fi` of each fingertip. The law only uses how it changes, so that any frame fixed to the fingertip
@@ -40,11 +52,55 @@ pub struct Posture<T, const J: usize, const F: usize> {
     pub attitudes: [Matrix3<T>; F],
 }
 
+/// Where a joint is within its planar chain.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct JointPose<T> {
+    /// First joint of the chain.
+    chain: usize,
+    /// Of the angle between the chain's axes and the link.
+    sine: T,
+    cosine: T,
+    /// From the base's origin, in the chain's axes, m.
+    origin_m: Vector3<T>,
+}
+
+impl<T: Real> JointPose<T> {
+    /// A vector of the link in the chain's axes.
+    #[inline]
+    fn turned(&self, v: &Vector3<T>) -> Vector3<T> {
+        Vector3::new(v.x * self.cosine - v.y * self.sine, v.x * self.sine + v.y * self.cosine, v.z)
+    }
+}
+
 impl<T: Real, const J: usize, const F: usize> Posture<T, J, F> {
     /// Everything at the base: what [`Hand::forward_kinematics`] fills.
     pub fn at_base() -> Self {
-        let pose = LinkPose { origin_m: Vector3::zeros(), attitude: Matrix3::identity() };
-        Self { links: [pose; J], centres_m: [Vector3::zeros(); F], attitudes: [Matrix3::identity(); F] }
+        let joint = JointPose { chain: 0, sine: T::zero(), cosine: T::one(), origin_m: Vector3::zeros() };
+        Self {
+            chains: [Matrix3::identity(); J],
+            joints: [joint; J],
+            centres_m: [Vector3::zeros(); F],
+            attitudes: [Matrix3::identity(); F],
+        }
+    }
+
+    /// Where a link is; the base, for a joint that the hand has not.
+    #[inline]
+    pub fn link(&self, joint: usize) -> LinkPose<T> {
+        match self.at(joint) {
+            Some((joint, axes)) => LinkPose {
+                origin_m: turn_vector(axes, &joint.origin_m),
+                attitude: turn_about_z(axes, joint.sine, joint.cosine),
+            },
+            None => LinkPose { origin_m: Vector3::zeros(), attitude: Matrix3::identity() },
+        }
+    }
+
+    /// A joint, and the axes of its chain.
+    #[inline]
+    fn at(&self, joint: usize) -> Option<(&JointPose<T>, &Matrix3<T>)> {
+        let joint = self.joints.get(joint)?;
+        Some((joint, self.chains.get(joint.chain)?))
     }
 }
 
@@ -67,27 +123,40 @@ impl<T: Real> Wrench<T> {
 impl<T: Real, const J: usize, const F: usize> Hand<T, J, F> {
     /// Places every link and fingertip for the joint angles `q`, rad.
     pub fn forward_kinematics(&self, angles_rad: &[T; J], posture: &mut Posture<T, J, F>) {
-        let base = LinkPose { origin_m: Vector3::zeros(), attitude: Matrix3::identity() };
-        // All sines and cosines first: they are independent, and a machine with vector registers computes several at once.
-        let turns = angles_rad.map(Real::sine_cosine);
+        // The joint before, and the angle between its chain's axes and its link.
+        let mut before =
+            JointPose { chain: 0, sine: T::zero(), cosine: T::one(), origin_m: Vector3::zeros() };
+        let mut angle = T::zero();
         for k in 0..self.joint_count.min(J) {
-            let (joint, (sine, cosine)) = (&self.joints[k], turns[k]);
-            let parent = joint.parent.and_then(|parent| posture.links.get(parent)).unwrap_or(&base);
-            let origin_m = parent.point(&joint.offset_m);
-            let attitude = match &joint.attitude {
-                Some(attitude) => turn_about_z(&product(&parent.attitude, attitude), sine, cosine),
-                None => turn_about_z(&parent.attitude, sine, cosine),
+            let joint = &self.joints[k];
+            let (chain, origin_m) = match &joint.bend {
+                None => {
+                    angle += angles_rad[k];
+                    (before.chain, before.origin_m + before.turned(&joint.offset_m))
+                }
+                Some(bend) => {
+                    angle = angles_rad[k];
+                    let (axes, origin_m) = match joint.parent.and_then(|parent| posture.at(parent)) {
+                        Some((parent, axes)) => {
+                            let bend = bend.after(parent.sine, parent.cosine);
+                            (bend.turn_axes(axes), bend.into_new(&parent.origin_m) + joint.offset_m)
+                        }
+                        None => (bend.axes(), joint.offset_m),
+                    };
+                    posture.chains[k] = axes;
+                    (k, origin_m)
+                }
             };
-            posture.links[k] = LinkPose { origin_m, attitude };
+            let (sine, cosine) = angle.sine_cosine();
+            before = JointPose { chain, sine, cosine, origin_m };
+            posture.joints[k] = before;
         }
         for (i, fingertip) in self.fingertips.iter().take(self.fingertip_count).enumerate() {
-            if let (Some(pose), Some(centre), Some(attitude)) = (
-                posture.links.get(fingertip.link),
-                posture.centres_m.get_mut(i),
-                posture.attitudes.get_mut(i),
-            ) {
-                *centre = pose.point(&fingertip.offset_m);
-                *attitude = pose.attitude;
+            if let Some((joint, axes)) = posture.at(fingertip.link) {
+                let centre = turn_vector(axes, &(joint.origin_m + joint.turned(&fingertip.offset_m)));
+                let attitude = turn_about_z(axes, joint.sine, joint.cosine);
+                posture.centres_m[i] = centre;
+                posture.attitudes[i] = attitude;
             }
         }
     }
@@ -102,45 +171,86 @@ impl<T: Real, const J: usize, const F: usize> Hand<T, J, F> {
         let mut linear = SMatrix::<T, 3, J>::zeros();
         let mut angular = SMatrix::<T, 3, J>::zeros();
         for k in self.joints_to(fingertip) {
-            let axis = posture.links[k].axis();
-            let lever = posture.centres_m[fingertip] - posture.links[k].origin_m;
+            let pose = posture.link(k);
+            let (axis, lever) = (pose.axis(), posture.centres_m[fingertip] - pose.origin_m);
             linear.set_column(k, &axis.cross(&lever));
             angular.set_column(k, &axis);
         }
         (linear, angular)
     }
 
-    /// Joint torques that put wrenches on the fingertips, `sum(J_i^T F_i + J_Omega i^T M_i)`, N m, without forming a Jacobian.
+    /// Joint torques that put wrenches on the fingertips, `sum(J_i^T F_i + J_Omega i^T M_i)`, N m.
     pub fn fingertip_torques(&self, posture: &Posture<T, J, F>, wrenches: &[Wrench<T>; F]) -> [T; J] {
         let mut torques = [T::zero(); J];
-        let placed = wrenches.iter().zip(&posture.centres_m);
-        for (fingertip, (wrench, centre)) in self.fingertips.iter().zip(placed).take(self.fingertip_count) {
-            let mut below = Some(fingertip.link);
-            while let Some(k) = below.filter(|&k| k < J) {
-                let pose = &posture.links[k];
-                let moment = wrench.moment_nm + cross(&(centre - pose.origin_m), &wrench.force_n);
-                torques[k] += dot(&pose.axis(), &moment);
-                below = self.joints[k].parent;
-            }
+        for (i, wrench) in wrenches.iter().enumerate().take(self.fingertip_count) {
+            self.push_fingertip(posture, i, wrench, &mut torques);
         }
         torques
     }
 
-    /// Joint torques `g(q)` that hold the weight of the links, N m. One pass from the fingertips to the base, which carries
-    /// the first moment of everything above each joint.
+    /// Joint torques `g(q)` that hold the weight of the links, N m.
     pub fn gravity_torques(&self, posture: &Posture<T, J, F>, gravity_m_s2: &Vector3<T>) -> [T; J] {
         let mut torques = [T::zero(); J];
+        self.hold_weight(posture, gravity_m_s2, &mut torques);
+        torques
+    }
+
+    /// Adds the joint torques that put a wrench on one fingertip, without forming a Jacobian: from the fingertip to the
+    /// base, it is projected on the plane of each chain, where all joints see the same force and the same moment
+    /// about the base's origin.
+    #[inline]
+    pub(crate) fn push_fingertip(
+        &self,
+        posture: &Posture<T, J, F>,
+        fingertip: usize,
+        wrench: &Wrench<T>,
+        torques: &mut [T; J],
+    ) {
+        let Some(centre) = posture.centres_m.get(fingertip) else { return };
+        let force = &wrench.force_n;
+        let moment = wrench.moment_nm + cross(centre, force);
+        let mut link = Some(self.fingertip_link(fingertip));
+        while let Some((last, (pose, axes))) = link.and_then(|last| Some((last, posture.at(last)?))) {
+            let (x, y) = (dot(&x_axis(axes), force), dot(&y_axis(axes), force));
+            let z = dot(&z_axis(axes), &moment);
+            for k in (pose.chain..last + 1).rev() {
+                let (Some(pose), Some(torque)) = (posture.joints.get(k), torques.get_mut(k)) else { return };
+                *torque += z - (pose.origin_m.x * y - pose.origin_m.y * x);
+            }
+            link = self.parent(pose.chain);
+        }
+    }
+
+    /// Adds the joint torques that hold the weight of the links: one pass from the fingertips to the base, which sums up
+    /// the first moments of the augmented bodies above each joint.
+    #[inline]
+    pub(crate) fn hold_weight(
+        &self,
+        posture: &Posture<T, J, F>,
+        gravity_m_s2: &Vector3<T>,
+        torques: &mut [T; J],
+    ) {
         let upwards = -gravity_m_s2;
-        let mut carried = [Vector3::zeros(); J];
-        for k in (0..self.joint_count.min(J)).rev() {
-            let (joint, pose) = (&self.joints[k], &posture.links[k]);
-            let moment = carried[k] + turn_vector(&pose.attitude, &joint.first_moment_kg_m);
-            torques[k] = dot(&pose.axis(), &cross(&moment, &upwards));
-            let parent = joint.parent.unwrap_or(J);
-            if let (Some(below), Some(carried)) = (posture.links.get(parent), carried.get_mut(parent)) {
-                *carried += moment + (pose.origin_m - below.origin_m) * joint.carried_kg;
+        // In the axes of each joint's chain.
+        let mut moments: [Vector3<T>; J] =
+            core::array::from_fn(|k| posture.joints[k].turned(&self.joints[k].first_moment_kg_m));
+        let mut end = self.joint_count.min(J);
+        while let Some((_, axes)) = end.checked_sub(1).and_then(|last| posture.at(last)) {
+            let (x, y) = (dot(&x_axis(axes), &upwards), dot(&y_axis(axes), &upwards));
+            let mut moment = Vector3::zeros();
+            for k in (0..end.min(J)).rev() {
+                moment += moments[k];
+                torques[k] += moment.x * y - moment.y * x;
+                end = k;
+                let joint = &self.joints[k];
+                if let Some(bend) = &joint.bend {
+                    let parent = joint.parent.unwrap_or(J);
+                    if let (Some(pose), Some(below)) = (posture.joints.get(parent), moments.get_mut(parent)) {
+                        *below += bend.after(pose.sine, pose.cosine).into_old(&moment);
+                    }
+                    break;
+                }
             }
         }
-        torques
     }
 }

@@ -16,4 +16,4 @@ pub mod kinematics;
 pub mod model;
 
 pub use kinematics::{LinkPose, Posture, Wrench};
-pub use model::{Fingertip, Hand, HandError, Joint, Link, PreparedJoint};
+pub use model::{Bend, Fingertip, Hand, HandError, Joint, Link, PreparedJoint};

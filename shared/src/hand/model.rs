@@ -129,16 +129,32 @@ impl fmt::Display for HandError {
 
 impl core::error::Error for HandError {}
 
+/// How the axes of a planar chain lie against those of the link that it starts from, by the angles of Denavit and
+/// Hartenberg: turned about z until x is the common normal of both joint axes, then twisted about x.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Bend<T> {
+    /// Sine of the turn.
+    pub turn_sine: T,
+    /// Cosine of the turn.
+    pub turn_cosine: T,
+    /// Sine of the twist.
+    pub twist_sine: T,
+    /// Cosine of the twist.
+    pub twist_cosine: T,
+}
+
 /// A joint as the kinematics wants it: its link frame is chosen such that the joint turns about the local z axis.
+///
+/// A joint that follows its parent in the list and has a parallel axis continues the parent's **planar chain**: its frame
+/// at zero angle is the parent's. All other joints start a chain.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PreparedJoint<T> {
     /// Index of the parent link's joint, smaller than this joint's own; `None` for the base.
     pub parent: Option<usize>,
-    /// Joint origin in the parent's prepared frame, m.
+    /// How the joint starts a chain; `None` for a joint that continues the chain of the joint before it, its parent.
+    pub bend: Option<Bend<T>>,
+    /// From the parent's origin to this joint's, in the prepared frame at zero angle, m.
     pub offset_m: Vector3<T>,
-    /// Prepared frame at zero angle in the parent's prepared frame; `None` where the two axes are parallel, because the
-    /// frame is then chosen to be the parent's, and forward kinematics saves a product.
-    pub attitude: Option<Matrix3<T>>,
     /// Prepared frame in the link frame of the description.
     pub from_link: Matrix3<T>,
     /// Lower end stop, rad.
@@ -147,10 +163,9 @@ pub struct PreparedJoint<T> {
     pub upper_rad: T,
     /// The link that turns with the joint, in the prepared frame.
     pub link: Link<T>,
-    /// Mass of the link times its centre, kg m.
+    /// First moment about the joint of its **augmented body**, kg m: of the link, with the mass of everything further
+    /// out lumped where the next joints sit.
     pub first_moment_kg_m: Vector3<T>,
-    /// Mass of everything that the joint carries, kg.
-    pub carried_kg: T,
 }
 
 /// A hand, checked and prepared: at most `J` joints and `F` fingertips.
@@ -175,19 +190,24 @@ impl<T: Real, const J: usize, const F: usize> Hand<T, J, F> {
             joints: [PreparedJoint::still(); J],
             fingertips: [no_fingertip(); F],
         };
+        // Mass of everything that a joint carries, kg.
+        let mut carried_kg = [T::zero(); J];
         for (k, joint) in joints.iter().enumerate() {
             check_joint(k, joint)?;
-            let parent_from_link = match joint.parent {
+            let parent = match joint.parent {
                 Some(parent) if parent >= k => return Err(HandError::ParentNotBefore { joint: k }),
-                Some(parent) => hand.joints[parent].from_link,
-                None => Matrix3::identity(),
+                parent => parent.map(|parent| &hand.joints[parent]),
             };
-            hand.joints[k] = PreparedJoint::new(joint, &parent_from_link);
+            hand.joints[k] = PreparedJoint::new(k, joint, parent);
+            carried_kg[k] = joint.link.mass_kg;
         }
-        for k in (0..hand.joint_count).rev() {
-            if let Some(parent) = hand.joints[k].parent {
-                let carried_kg = hand.joints[k].carried_kg;
-                hand.joints[parent].carried_kg += carried_kg;
+        for (k, joint) in joints.iter().enumerate().rev() {
+            if let Some(parent) = joint.parent {
+                let below = &mut hand.joints[parent];
+                let offset_m = below.from_link.transpose() * joint.offset_m;
+                let carried = carried_kg[k];
+                below.first_moment_kg_m += offset_m * carried;
+                carried_kg[parent] += carried;
             }
         }
         for (i, fingertip) in fingertips.iter().enumerate() {
@@ -206,7 +226,8 @@ impl<T: Real, const J: usize, const F: usize> Hand<T, J, F> {
     /// host prepares a hand, the firmware is built with the result. What was computed is believed, the tree is checked.
     ///
     /// # Errors
-    /// No joint, fewer than two fingertips, a parent that does not come before its joint, or a fingertip on no link.
+    /// No joint, fewer than two fingertips, a parent that does not come before its joint, a chain that continues nothing,
+    /// or a fingertip on no link.
     pub const fn from_prepared(
         joints: [PreparedJoint<T>; J],
         fingertips: [Fingertip<T>; F],
@@ -223,6 +244,14 @@ impl<T: Real, const J: usize, const F: usize> Hand<T, J, F> {
                 && parent >= joint
             {
                 return Err(HandError::ParentNotBefore { joint });
+            }
+            let continues = match joints[joint].parent {
+                Some(parent) => parent + 1 == joint,
+                None => false,
+            };
+            if joints[joint].bend.is_none() && !continues {
+                let reason = "has to be given where the joint before is not the parent";
+                return Err(HandError::Joint { joint, parameter: "bend", reason });
             }
             joint += 1;
         }
@@ -314,7 +343,7 @@ impl<T: Real, const J: usize, const F: usize> Hand<T, J, F> {
         self.joints.get(joint).map_or(PreparedJoint::still().link, |joint| joint.link)
     }
 
-    /// Where a joint sits in its parent's prepared frame, m: the bone between the two.
+    /// The bone from the parent's joint to a joint, in the joint's prepared frame at zero angle, m.
     pub fn offset_m(&self, joint: usize) -> Vector3<T> {
         self.joints.get(joint).map_or(Vector3::zeros(), |joint| joint.offset_m)
     }
@@ -336,8 +365,8 @@ impl<T: Real> PreparedJoint<T> {
     fn still() -> Self {
         Self {
             parent: None,
+            bend: None,
             offset_m: Vector3::zeros(),
-            attitude: None,
             from_link: Matrix3::identity(),
             lower_rad: T::zero(),
             upper_rad: T::zero(),
@@ -347,22 +376,24 @@ impl<T: Real> PreparedJoint<T> {
                 inertia_kg_m2: Matrix3::zeros(),
             },
             first_moment_kg_m: Vector3::zeros(),
-            carried_kg: T::zero(),
         }
     }
 
-    fn new(joint: &Joint<T>, parent_from_link: &Matrix3<T>) -> Self {
+    /// Joint `k`, on its parent.
+    fn new(k: usize, joint: &Joint<T>, parent: Option<&Self>) -> Self {
+        let parent_from_link = parent.map_or(Matrix3::identity(), |parent| parent.from_link);
         let to_parent = parent_from_link.transpose();
         let axis = to_parent * (joint.attitude * joint.axis);
         let axis = axis / norm(&axis);
-        let attitude = rotation_from_z(&axis);
-        let from_link =
-            joint.attitude.transpose() * parent_from_link * attitude.unwrap_or(Matrix3::identity());
+        let follows = joint.parent.is_some_and(|parent| parent + 1 == k);
+        let bend = if follows && is_z(&axis) { None } else { Some(Bend::to(&axis)) };
+        let attitude = bend.map_or(Matrix3::identity(), |bend| bend.axes());
+        let from_link = joint.attitude.transpose() * parent_from_link * attitude;
         let mass_centre_m = from_link.transpose() * joint.link.mass_centre_m;
         Self {
             parent: joint.parent,
-            offset_m: to_parent * joint.offset_m,
-            attitude,
+            bend,
+            offset_m: attitude.transpose() * (to_parent * joint.offset_m),
             from_link,
             lower_rad: joint.lower_rad,
             upper_rad: joint.upper_rad,
@@ -372,15 +403,14 @@ impl<T: Real> PreparedJoint<T> {
                 inertia_kg_m2: from_link.transpose() * joint.link.inertia_kg_m2 * from_link,
             },
             first_moment_kg_m: mass_centre_m * joint.link.mass_kg,
-            carried_kg: joint.link.mass_kg,
         }
     }
 
     fn cast<U: Real>(&self) -> PreparedJoint<U> {
         PreparedJoint {
             parent: self.parent,
+            bend: self.bend.map(|bend| bend.cast()),
             offset_m: cast(&self.offset_m),
-            attitude: self.attitude.map(|attitude| attitude.map(|v| U::from_f64(v.to_f64()))),
             from_link: self.from_link.map(|v| U::from_f64(v.to_f64())),
             lower_rad: U::from_f64(self.lower_rad.to_f64()),
             upper_rad: U::from_f64(self.upper_rad.to_f64()),
@@ -390,7 +420,6 @@ impl<T: Real> PreparedJoint<T> {
                 inertia_kg_m2: self.link.inertia_kg_m2.map(|v| U::from_f64(v.to_f64())),
             },
             first_moment_kg_m: cast(&self.first_moment_kg_m),
-            carried_kg: U::from_f64(self.carried_kg.to_f64()),
         }
     }
 }
@@ -404,21 +433,82 @@ fn cast<T: Real, U: Real>(v: &Vector3<T>) -> Vector3<U> {
     v.map(|v| U::from_f64(v.to_f64()))
 }
 
-/// The smallest rotation that takes z to `axis`; `None` where that is no rotation at all.
-fn rotation_from_z<T: Real>(axis: &Vector3<T>) -> Option<Matrix3<T>> {
-    let one = T::one();
-    let c = axis.z;
-    if c < T::zero() {
-        // Half a turn about x first, so that the formula below stays far from its singularity at -z.
-        let flip = Matrix3::from_diagonal(&Vector3::new(one, -one, -one));
-        return Some(flip * rotation_from_z(&(flip * axis)).unwrap_or(Matrix3::identity()));
+/// Whether a unit vector is z, but for rounding: axes that a file gives as parallel differ by some once they went
+/// through a rotation or two.
+fn is_z<T: Real>(axis: &Vector3<T>) -> bool {
+    let rounding = T::from_f64(if T::from_f64(1.0 + 1e-9) == T::one() { 1e-6 } else { 1e-14 });
+    axis.z > T::zero() && axis.x.magnitude() <= rounding && axis.y.magnitude() <= rounding
+}
+
+impl<T: Real> Bend<T> {
+    /// The bend that takes z to `axis`, a unit vector.
+    fn to(axis: &Vector3<T>) -> Self {
+        let across = norm(&Vector3::new(axis.x, axis.y, T::zero()));
+        let (turn_sine, turn_cosine) = if across > T::zero() {
+            (axis.x / across, -axis.y / across)
+        } else {
+            // Parallel axes have many common normals.
+            (T::zero(), T::one())
+        };
+        Self { turn_sine, turn_cosine, twist_sine: across, twist_cosine: axis.z }
     }
-    let (x, y) = (axis.x, axis.y);
-    // Axes that a file gives as parallel differ by rounding once they went through a rotation or two.
-    let rounding = T::from_f64(if T::from_f64(1.0 + 1e-9) == one { 1e-6 } else { 1e-14 });
-    if x.magnitude() <= rounding && y.magnitude() <= rounding {
-        return None;
+
+    fn cast<U: Real>(&self) -> Bend<U> {
+        let cast = |v: T| U::from_f64(v.to_f64());
+        Bend {
+            turn_sine: cast(self.turn_sine),
+            turn_cosine: cast(self.turn_cosine),
+            twist_sine: cast(self.twist_sine),
+            twist_cosine: cast(self.twist_cosine),
+        }
     }
-    let k = one / (one + c);
-    Some(Matrix3::new(one - x * x * k, -x * y * k, x, -x * y * k, one - y * y * k, y, -x, -y, c))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    type Pair = ([PreparedJoint<f32>; 3], [Fingertip<f32>; 2]);
+
+    /// Two fingers, one of two joints.
+    fn pair() -> Pair {
+        let bend = Some(Bend::to(&Vector3::x()));
+        let joint = |parent: Option<usize>| PreparedJoint {
+            parent,
+            bend: bend.filter(|_| parent.is_none()),
+            ..PreparedJoint::still()
+        };
+        let fingertip = |link| Fingertip { link, offset_m: Vector3::zeros(), radius_m: 0.01 };
+        ([joint(None), joint(Some(0)), joint(None)], [fingertip(1), fingertip(2)])
+    }
+
+    #[test]
+    fn a_prepared_hand_is_the_hand_that_was_prepared() {
+        let (joints, fingertips) = pair();
+        let hand = Hand::from_prepared(joints, fingertips).unwrap();
+        assert_eq!((hand.joint_count(), hand.fingertip_count()), (3, 2));
+        assert_eq!((hand.prepared_joints(), hand.prepared_fingertips()), (&joints[..], &fingertips[..]));
+        let larger: Hand<f32, 7, 4> = hand.fit().unwrap();
+        assert_eq!((larger.prepared_joints(), larger.prepared_fingertips()), (&joints[..], &fingertips[..]));
+    }
+
+    #[test]
+    fn what_is_no_tree_is_refused() {
+        let (mut joints, fingertips) = pair();
+        joints[1].parent = Some(1);
+        let error = Hand::from_prepared(joints, fingertips).unwrap_err();
+        assert_eq!(error, HandError::ParentNotBefore { joint: 1 });
+        let (mut joints, fingertips) = pair();
+        joints[2].bend = None;
+        let error = Hand::from_prepared(joints, fingertips).unwrap_err();
+        assert!(matches!(error, HandError::Joint { joint: 2, parameter: "bend", .. }));
+        let (joints, mut fingertips) = pair();
+        fingertips[1].link = 3;
+        let error = Hand::from_prepared(joints, fingertips).unwrap_err();
+        assert!(matches!(error, HandError::Fingertip { fingertip: 1, parameter: "link", .. }));
+        let error = Hand::<f32, 3, 1>::from_prepared(joints, [fingertips[0]]).unwrap_err();
+        assert_eq!(error, HandError::TooFewFingertips { count: 1 });
+        let error = Hand::<f32, 0, 2>::from_prepared([], fingertips).unwrap_err();
+        assert_eq!(error, HandError::NoJoints);
+    }
 }

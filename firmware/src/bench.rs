@@ -1,0 +1,224 @@
+//! Executed instructions of the parts of a tick, counted in QEMU.
+//!
+//! With `-icount shift=4,sleep=off` QEMU lets 16 ns pass for each instruction, and its SysTick counts 168 MHz: 2.688
+//! counts an instruction, whatever the host does meanwhile. What reading the timer costs is measured too, and taken
+//! off. The figures are exact and the same in every run; they are instructions, not cycles.
+//!
+//! Everything is measured in a grasp that has its full force, with joints that move, and the largest of many ticks is
+//! told.
+
+use crate::control::{Control, Timing};
+use crate::joints::Joints;
+use crate::link::MOST_SENT;
+use crate::model::{FINGERS, JOINTS, params};
+use crate::queue::HandReply;
+use crate::semihosting::File;
+use blindgrasp_shared::command::{Command, Grasp};
+use blindgrasp_shared::control::{GraspConfig, Grip, Latch};
+use blindgrasp_shared::device::Reading;
+use blindgrasp_shared::fault::Raised;
+use blindgrasp_shared::hand::Posture;
+use blindgrasp_shared::link::encode;
+use blindgrasp_shared::link::message::{Packet, Reply, Request, Signals};
+use blindgrasp_shared::supervisor::Mode;
+use blindgrasp_shared::telemetry::INTERFACE_VERSION;
+use blindgrasp_shared::tick::Params;
+use core::fmt::Write;
+use core::hint::black_box;
+use cortex_m::peripheral::SYST;
+use cortex_m::peripheral::syst::SystClkSource;
+use heapless::String;
+
+type HandParams = Params<f32, JOINTS, FINGERS>;
+
+/// Ticks that are measured, after the grasp has its full force.
+const TICKS: usize = 200;
+
+/// Counts instructions.
+struct Counter {
+    /// Timer counts of measuring nothing.
+    empty: u32,
+}
+
+impl Counter {
+    fn new(timer: &mut SYST) -> Self {
+        timer.set_clock_source(SystClkSource::Core);
+        timer.set_reload(0x00FF_FFFF);
+        timer.clear_current();
+        timer.disable_interrupt();
+        timer.enable_counter();
+        let mut counter = Self { empty: 0 };
+        counter.empty = counter.timer_counts(|| ());
+        counter
+    }
+
+    /// The timer counts downwards, in 24 bits.
+    #[inline(never)]
+    fn timer_counts(&self, measured: impl FnOnce()) -> u32 {
+        let began = SYST::get_current();
+        measured();
+        let ended = SYST::get_current();
+        began.wrapping_sub(ended) & 0x00FF_FFFF
+    }
+
+    fn instructions(&self, measured: impl FnOnce()) -> u32 {
+        let counts = self.timer_counts(measured).saturating_sub(self.empty);
+        // Counts / 2.688, to the nearest.
+        ((u64::from(counts) * 1000 + 1344) / 2688) as u32
+    }
+}
+
+/// The figures.
+#[derive(Default)]
+struct Figures {
+    law_gravity_off: u32,
+    law_gravity_on: u32,
+    tick: u32,
+    encode: u32,
+    record_bytes: usize,
+}
+
+/// Joints that move a little about the middle of their ranges.
+struct Swinging<'p> {
+    params: &'p HandParams,
+    tick: usize,
+}
+
+impl Swinging<'_> {
+    fn angles_rad(&self) -> [f32; JOINTS] {
+        // A triangle of 0.02 rad in 64 ticks, with a phase of its own for each joint.
+        core::array::from_fn(|joint| {
+            let (lower, upper) =
+                self.params.hand().range_rad(joint.min(self.params.hand().joint_count() - 1));
+            let phase = (self.tick + 5 * joint) % 64;
+            let triangle = if phase < 32 { phase } else { 64 - phase };
+            0.5 * (lower + upper) + (triangle as f32 / 32.0 - 0.5) * 0.02
+        })
+    }
+}
+
+impl Joints<JOINTS> for Swinging<'_> {
+    fn read(&mut self) -> Reading<JOINTS> {
+        self.tick += 1;
+        let angles_rad = self.angles_rad();
+        let encoders = &self.params.config().estimator.encoders;
+        Reading::Counts(core::array::from_fn(|joint| {
+            let encoder = encoders[joint];
+            let turned = (angles_rad[joint] / encoder.rad_per_count) as i32;
+            encoder.zero_count + if encoder.reversed { -turned } else { turned }
+        }))
+    }
+
+    fn write(&mut self, _torques_nm: &[f32; JOINTS]) -> Option<Raised> {
+        None
+    }
+}
+
+/// Measures, and prints one JSON object. Tells whether all of it could be done.
+pub fn run(timer: &mut SYST, control: &mut Control) -> Result<(), &'static str> {
+    let counter = Counter::new(timer);
+    let params = params();
+    let mut figures = Figures::default();
+    figures.law_gravity_on = law(&counter, &params, &params.config().law)?;
+    figures.law_gravity_off =
+        law(&counter, &params, &GraspConfig { gravity_m_s2: None, ..params.config().law })?;
+    whole_tick(&counter, &params, control, &mut figures)?;
+    print(&figures)
+}
+
+/// Forward kinematics and grasp law.
+fn law(
+    counter: &Counter,
+    params: &HandParams,
+    config: &GraspConfig<f32, JOINTS>,
+) -> Result<u32, &'static str> {
+    let hand = params.hand();
+    let law = config.prepare(hand).map_err(|_| "the law could not be prepared")?;
+    let mut joints = Swinging { params, tick: 0 };
+    let mut posture = Posture::at_base();
+    hand.forward_kinematics(&joints.angles_rad(), &mut posture);
+    let latch = Latch::of(&posture);
+    let speeds_rad_s = [0.3; JOINTS];
+    let mut most = 0;
+    for tick in 0..TICKS {
+        joints.tick = tick;
+        let angles_rad = joints.angles_rad();
+        most = most.max(counter.instructions(|| {
+            hand.forward_kinematics(black_box(&angles_rad), &mut posture);
+            let grip = Grip {
+                latch: &latch,
+                force_n: config.force_n,
+                attitude_stiffness_nm: config.attitude_stiffness_nm,
+            };
+            black_box(law.torques(hand, &posture, black_box(&speeds_rad_s), Some(grip)));
+        }));
+    }
+    Ok(most)
+}
+
+/// The whole tick with its request, in a grasp, and the encoding of its record.
+fn whole_tick(
+    counter: &Counter,
+    params: &HandParams,
+    control: &mut Control,
+    figures: &mut Figures,
+) -> Result<(), &'static str> {
+    // From hello to full force: the soft start takes as long as it takes.
+    let settle = 20 + params.config().supervisor.soft_start_ms as usize;
+    let mut joints = Swinging { params, tick: 0 };
+    let mut session = 0;
+    for tick in 0..settle + TICKS {
+        let request = match tick {
+            0 => Request::Hello { interface_version: INTERFACE_VERSION },
+            1 => Request::Telemetry { decimation: 1, signals: Signals::ALL },
+            5 => Request::Command(Command::Arm),
+            10 => Request::Command(Command::Grasp(Grasp::CONFIGURED)),
+            _ => Request::Heartbeat,
+        };
+        let packet = Packet { session, sequence: tick as u16, request };
+        let mut outputs = None;
+        let instructions = counter.instructions(|| {
+            outputs = Some(control.turn(black_box(&mut joints), Some(packet), Timing::default(), 0));
+        });
+        // What making up the joints took is not the tick's.
+        let idle = counter.instructions(|| {
+            joints.tick -= 1;
+            black_box(joints.read());
+        });
+        let Some(outputs) = outputs else { return Err("there was no tick") };
+        match outputs.reply {
+            Some(Reply::Identity { session: given, .. }) => session = given,
+            Some(Reply::Answer { refused: Some(_), .. }) => return Err("a request was refused"),
+            _ => {}
+        }
+        if tick < settle {
+            continue;
+        }
+        if outputs.record.mode != Mode::Grasping {
+            return Err("the hand does not grasp");
+        }
+        figures.tick = figures.tick.max(instructions.saturating_sub(idle));
+        let record: HandReply = Reply::Record(outputs.record);
+        let mut buffer = [0; MOST_SENT];
+        let mut length = 0;
+        let instructions = counter.instructions(|| {
+            length = encode(black_box(&record), black_box(&mut buffer)).map_or(0, <[u8]>::len);
+        });
+        figures.encode = figures.encode.max(instructions);
+        figures.record_bytes = figures.record_bytes.max(length);
+    }
+    Ok(())
+}
+
+fn print(figures: &Figures) -> Result<(), &'static str> {
+    let Figures { law_gravity_off, law_gravity_on, tick, encode, record_bytes } = figures;
+    let mut json = String::<256>::new();
+    writeln!(
+        json,
+        "{{\"law_gravity_off\": {law_gravity_off}, \"law_gravity_on\": {law_gravity_on}, \"tick\": {tick}, \
+         \"encode\": {encode}, \"frame_bytes\": {record_bytes}}}"
+    )
+    .map_err(|_| "the figures are too long")?;
+    let mut output = File::standard_output().ok_or("there is no standard output")?;
+    if output.write(json.as_bytes()) { Ok(()) } else { Err("the figures could not be written") }
+}

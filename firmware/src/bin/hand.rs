@@ -1,0 +1,126 @@
+//! The image with real joints.
+#![cfg_attr(target_os = "none", no_std, no_main)]
+// The framework's macro writes some.
+#![cfg_attr(target_os = "none", allow(unsafe_code))]
+
+#[cfg(target_os = "none")]
+#[rtic::app(device = stm32f4xx_hal::pac, peripherals = true)]
+mod app {
+    use blindgrasp_firmware::board::{self, Buses, HandJoints};
+    use blindgrasp_firmware::boot::Boot;
+    use blindgrasp_firmware::control::{Control, Timing};
+    use blindgrasp_firmware::link::Link;
+    use blindgrasp_firmware::model::IMAGE_HAND;
+    use blindgrasp_firmware::queue::{ControlEnd, Queues};
+    use blindgrasp_firmware::report::{self, LineReport};
+    use blindgrasp_firmware::schedule::{self, Turn};
+    use blindgrasp_firmware::serial::{self, Bytes, Interrupt, Line};
+    use blindgrasp_shared::link::message::Reply;
+    use stm32f4xx_hal::prelude::*;
+    use stm32f4xx_hal::watchdog::IndependentWatchdog;
+
+    #[shared]
+    struct Shared {}
+
+    #[local]
+    struct Local {
+        interrupt: Interrupt,
+        control: Control,
+        joints: HandJoints,
+        queues: ControlEnd<'static>,
+        last: Timing,
+        /// On hardware.
+        watchdog: Option<IndependentWatchdog>,
+        link: Link<'static, Line>,
+    }
+
+    #[init(local = [bytes: Bytes = Bytes::new(), all_queues: Queues = Queues::new(), buses: Buses = Buses::new()])]
+    fn init(mut cx: init::Context) -> (Shared, Local) {
+        let device = cx.device;
+        let mut boot = Boot::new(device.RCC, &device.DBGMCU);
+        report::start(&boot, &IMAGE_HAND);
+        let rcc = &mut boot.rcc;
+        let (line_pins, joint_pins) = board::pins(device.GPIOA, device.GPIOB, device.GPIOC, rcc);
+        let joints = board::joints(device.SPI1, device.SPI2, joint_pins, cx.local.buses, rcc);
+        let (interrupt, line) = serial::start(device.USART2, line_pins, cx.local.bytes, rcc)
+            .expect("the board's baud rate can be had from its clock");
+        let (queues, link_end) = cx.local.all_queues.split();
+        let controller = boot.device(&IMAGE_HAND);
+        let period_us = controller.params().config().period_us;
+
+        let watchdog = (!boot.is_emulated()).then(|| {
+            let mut watchdog = IndependentWatchdog::new(device.IWDG);
+            watchdog.stop_on_debug(&device.DBGMCU, true);
+            watchdog.start(board::WATCHDOG_MS.millis());
+            watchdog
+        });
+        schedule::start_cycle_counter(&mut cx.core.DCB, &mut cx.core.DWT);
+        schedule::start(&mut cx.core.SYST, period_us, boot.is_emulated());
+        let local = Local {
+            interrupt,
+            control: Control::new(controller),
+            joints,
+            queues,
+            last: Timing::default(),
+            watchdog,
+            link: Link::new(line, link_end),
+        };
+        (Shared {}, local)
+    }
+
+    /// The control task.
+    ///
+    /// - **Starts** it: SysTick, every millisecond (the period of the hand's configuration).
+    /// - **Deadline**: the next start. Within it, 12 joints take about 0.25 ms on the buses, the tick about 0.1 ms.
+    ///   Nothing but the interrupt of a received byte gets in between, which takes 3 % of the time at the very most.
+    /// - **Late**: the turn is finished, and the next one begins at once; starts beyond that one are lost. The next tick
+    ///   is told, counts it, and makes it a fault when there are too many.
+    /// - **Never ends**: nobody feeds the watchdog, and the hand is reset.
+    #[task(binds = SysTick, priority = 2, local = [control, joints, queues, last, watchdog])]
+    fn control(cx: control::Context) {
+        let control::LocalResources { control, joints, queues, last, watchdog, .. } = cx.local;
+        let turn = Turn::begin();
+        let packet = queues.take();
+        let mut outputs = control.turn(joints, packet, *last, queues.dropped());
+        if let Some(reply) = outputs.reply {
+            queues.post(reply);
+        }
+        if let Some(signals) = outputs.telemetry {
+            outputs.record.keep(signals);
+            queues.post(Reply::Record(outputs.record));
+        }
+        if let Some(watchdog) = watchdog {
+            watchdog.feed();
+        }
+        *last = turn.end();
+    }
+
+    /// A byte from the line: see [`serial`] for why this preempts the control task, and what it costs.
+    #[task(binds = USART2, priority = 3, local = [interrupt])]
+    fn byte(cx: byte::Context) {
+        cx.local.interrupt.serve();
+    }
+
+    /// All that has time: frames, and logs.
+    #[idle(local = [link, report: LineReport = LineReport::new()])]
+    fn idle(cx: idle::Context) -> ! {
+        let idle::LocalResources { link, report, .. } = cx.local;
+        loop {
+            link.poll();
+            report.poll(link.counters());
+            // Without interrupts, so that one that comes after the look is not slept through: it ends the sleep, and is
+            // served after it.
+            cortex_m::interrupt::free(|_| {
+                if link.is_idle() {
+                    cortex_m::asm::wfi();
+                }
+            });
+        }
+    }
+}
+
+#[cfg(not(target_os = "none"))]
+fn main() {
+    eprintln!("this is an image for an STM32F405: build it with --target thumbv7em-none-eabihf");
+    std::process::exit(2);
+}

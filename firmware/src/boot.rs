@@ -1,0 +1,49 @@
+//! The start that both images share: clock, and why there was a reset.
+
+use crate::{clock, crash, model, reset};
+use blindgrasp_shared::device::Device;
+use blindgrasp_shared::identity::{Clock, Crash, Identity, Image, ResetCause, UNITS};
+use stm32f4xx_hal::pac::{DBGMCU, RCC};
+use stm32f4xx_hal::rcc::Rcc;
+
+use crate::model::{FINGERS, JOINTS};
+
+/// What the start found.
+pub struct Boot {
+    /// The clock tree, running.
+    pub rcc: Rcc,
+    /// What drives it.
+    pub clock: Clock,
+    /// Why there was a reset.
+    pub reset: ResetCause,
+    /// What ended the run before it.
+    pub crash: Option<Crash>,
+}
+
+impl Boot {
+    /// Finds out why there was a reset, and starts the clock.
+    pub fn new(rcc: RCC, debug: &DBGMCU) -> Self {
+        let reset = reset::cause(rcc.csr().read().bits());
+        // The flags add up over resets until they are cleared.
+        rcc.csr().modify(|_, w| w.rmvf().clear());
+        // Logs stay readable while the processor sleeps, and the watchdog waits while it is halted.
+        debug.cr().modify(|_, w| w.dbg_sleep().set_bit());
+        let (rcc, clock) = clock::start(rcc, clock::is_emulated(debug));
+        Self { rcc, clock, reset, crash: crash::take() }
+    }
+
+    /// Whether this is QEMU.
+    pub fn is_emulated(&self) -> bool {
+        self.clock == Clock::Emulated
+    }
+
+    /// The hand, as the image's description calls it.
+    ///
+    /// # Panics
+    /// Never: the build wrote the description.
+    pub fn device(&self, image: &'static [u8]) -> Device<JOINTS, FINGERS> {
+        let image = Image::decode(image).expect("the build wrote the description");
+        let &Self { clock, reset, crash, .. } = self;
+        Device::new(model::params(), Identity { image, units: UNITS, clock, reset, crash })
+    }
+}

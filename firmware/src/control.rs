@@ -1,0 +1,56 @@
+//! One turn of the control task: a packet in, joints read, the tick, joints written, replies out.
+//!
+//! Nothing is decided here: what the hand does is in [`Device`], the same code on the host.
+
+use crate::joints::Joints;
+use crate::model::{FINGERS, JOINTS};
+use crate::queue::HandPacket;
+use blindgrasp_shared::command::Command;
+use blindgrasp_shared::device::{Device, Inputs, Outputs, Reading};
+use blindgrasp_shared::fault::Raised;
+use blindgrasp_shared::link::message::Request;
+
+/// What the turn before told about itself.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Timing {
+    /// It missed its deadline.
+    pub late: bool,
+    /// Processor cycles that it took; zero where they can't be counted.
+    pub cycles: u32,
+}
+
+/// The hand, and what one turn leaves for the next.
+pub struct Control {
+    device: Device<JOINTS, FINGERS>,
+    /// What went wrong when the joints were last written.
+    failed: Option<Raised>,
+}
+
+impl Control {
+    /// Before the first turn.
+    pub fn new(device: Device<JOINTS, FINGERS>) -> Self {
+        Self { device, failed: None }
+    }
+
+    /// One turn. Torques that could not be written are a failed reading in the next.
+    pub fn turn(
+        &mut self,
+        joints: &mut impl Joints<JOINTS>,
+        packet: Option<HandPacket>,
+        last: Timing,
+        dropped: u32,
+    ) -> Outputs<JOINTS> {
+        // Joints that failed work again only when the user clears the fault. Whether he may, the tick decides: they
+        // have no torque before that.
+        let clears = |packet: &HandPacket| packet.request == Request::Command(Command::ClearFault);
+        if packet.as_ref().is_some_and(clears) {
+            joints.recover();
+        }
+        let read = joints.read();
+        let reading = self.failed.take().map_or(read, Reading::Failed);
+        let inputs = Inputs { reading, late: last.late, cycles: last.cycles, dropped, packet };
+        let outputs = self.device.tick(&inputs);
+        self.failed = joints.write(&outputs.torques_nm);
+        outputs
+    }
+}

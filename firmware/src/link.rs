@@ -1,0 +1,247 @@
+//! Between the line and the control task: frames to packets, replies to frames. Runs when nothing else does.
+
+use crate::queue::{HandPacket, HandReply, LinkEnd};
+use blindgrasp_shared::command::Refusal;
+use blindgrasp_shared::link::message::{Packet, Reply, not_understood};
+use blindgrasp_shared::link::{Counters, Receiver, encode, most_bytes};
+use heapless::Deque;
+
+/// Bytes of the longest payload that is received, with its CRC.
+pub const MOST_RECEIVED: usize = HandPacket::MOST_BYTES + 4;
+/// Bytes of the longest frame that is sent.
+pub const MOST_SENT: usize = most_bytes(HandReply::MOST_BYTES);
+
+/// A line of bytes that never makes its user wait.
+pub trait Port {
+    /// The next byte, if one came.
+    fn receive(&mut self) -> Option<u8>;
+    /// Whether no byte waits.
+    fn is_silent(&self) -> bool;
+    /// Sends a byte if the line can take it now.
+    fn try_send(&mut self, byte: u8) -> bool;
+}
+
+/// What a frame with a good CRC held.
+pub enum Received {
+    /// A request.
+    Packet(HandPacket),
+    /// Something else; this is to be answered.
+    Unknown(HandReply),
+}
+
+/// Finds frames in whatever the port brings.
+pub struct Frames(Receiver<MOST_RECEIVED>);
+
+impl Frames {
+    /// Before the first byte.
+    pub const fn new() -> Self {
+        Self(Receiver::new())
+    }
+
+    /// Takes a byte; returns what the frame held that it completes. Bad frames are counted.
+    pub fn push(&mut self, byte: u8) -> Option<Received> {
+        let payload = self.0.push(byte)?.ok()?;
+        Some(
+            Packet::decode(payload)
+                .map_or_else(|_| Received::Unknown(not_understood(payload)), Received::Packet),
+        )
+    }
+
+    /// Frames good and bad.
+    pub fn counters(&self) -> Counters {
+        self.0.counters()
+    }
+}
+
+impl Default for Frames {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+/// The link of the hand.
+pub struct Link<'q, P> {
+    port: P,
+    frames: Frames,
+    queues: LinkEnd<'q>,
+    /// Answers to requests that do not get to the control task.
+    answers: Deque<HandReply, 4>,
+    /// The frame that is being sent, what of it is sent, and its length.
+    frame: [u8; MOST_SENT],
+    sent: usize,
+    length: usize,
+}
+
+impl<'q, P: Port> Link<'q, P> {
+    /// A link over a port.
+    pub fn new(port: P, queues: LinkEnd<'q>) -> Self {
+        Self {
+            port,
+            frames: Frames::new(),
+            queues,
+            answers: Deque::new(),
+            frame: [0; MOST_SENT],
+            sent: 0,
+            length: 0,
+        }
+    }
+
+    /// Does a small piece of what there is to do: all bytes that came, and a byte to send.
+    pub fn poll(&mut self) {
+        while let Some(byte) = self.port.receive() {
+            let answer = match self.frames.push(byte) {
+                None => continue,
+                Some(Received::Packet(packet)) => match self.queues.put(packet) {
+                    Ok(()) => continue,
+                    Err(packet) => busy(packet.sequence),
+                },
+                Some(Received::Unknown(answer)) => answer,
+            };
+            // With too many of these too, a request stays unanswered: the host sees that by the sequence numbers.
+            let _ = self.answers.push_back(answer);
+        }
+        if self.sent == self.length
+            && let Some(reply) = self.answers.pop_front().or_else(|| self.queues.take())
+        {
+            // The buffer has room for the longest reply, so this can't fail.
+            self.length = encode(&reply, &mut self.frame).map_or(0, <[u8]>::len);
+            self.sent = 0;
+        }
+        if self.sent < self.length
+            && let Some(&byte) = self.frame.get(self.sent)
+            && self.port.try_send(byte)
+        {
+            self.sent += 1;
+        }
+    }
+
+    /// Whether there is nothing to do until an interrupt.
+    pub fn is_idle(&self) -> bool {
+        self.sent == self.length && self.answers.is_empty() && self.queues.is_empty() && self.port.is_silent()
+    }
+
+    /// Frames good and bad.
+    pub fn counters(&self) -> Counters {
+        self.frames.counters()
+    }
+}
+
+/// The answer to a request for which there is no room.
+pub fn busy(sequence: u16) -> HandReply {
+    Reply::Answer { sequence, refused: Some(Refusal::Busy) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::queue::Queues;
+    use blindgrasp_shared::command::Command;
+    use blindgrasp_shared::link::message::Request;
+    use std::collections::VecDeque;
+    use std::vec::Vec;
+
+    /// What comes, and what was sent; the line takes a byte only at every other try.
+    #[derive(Default)]
+    struct Wire {
+        incoming: VecDeque<u8>,
+        sent: Vec<u8>,
+        free: bool,
+    }
+
+    impl Port for &mut Wire {
+        fn receive(&mut self) -> Option<u8> {
+            self.incoming.pop_front()
+        }
+
+        fn is_silent(&self) -> bool {
+            self.incoming.is_empty()
+        }
+
+        fn try_send(&mut self, byte: u8) -> bool {
+            self.free = !self.free;
+            if self.free {
+                self.sent.push(byte);
+            }
+            self.free
+        }
+    }
+
+    impl Wire {
+        fn say(&mut self, sequence: u16, request: Request<{ crate::model::JOINTS }>) {
+            let mut buffer = [0; most_bytes(HandPacket::MOST_BYTES)];
+            let packet = Packet { session: 1, sequence, request };
+            self.incoming.extend(encode(&packet, &mut buffer).unwrap());
+        }
+
+        /// Answers that were sent: their sequence numbers and refusals.
+        fn answers(&self) -> Vec<(u16, Option<Refusal>)> {
+            let mut receiver = Receiver::<{ HandReply::MOST_BYTES + 4 }>::new();
+            let mut answers = Vec::new();
+            for &byte in &self.sent {
+                let Some(payload) = receiver.push(byte) else { continue };
+                match Reply::<{ crate::model::JOINTS }>::decode(payload.unwrap()).unwrap() {
+                    Reply::Answer { sequence, refused } => answers.push((sequence, refused)),
+                    other => panic!("{other:?}"),
+                }
+            }
+            answers
+        }
+    }
+
+    /// Polls until there is nothing left to do.
+    fn settle(link: &mut Link<'_, &mut Wire>) {
+        for _ in 0..100_000 {
+            link.poll();
+            if link.is_idle() {
+                return;
+            }
+        }
+        panic!("the link does not come to rest");
+    }
+
+    #[test]
+    fn requests_without_room_are_answered_so_and_a_stop_has_room() {
+        let mut wire = Wire::default();
+        for sequence in 0..9 {
+            wire.say(sequence, Request::Heartbeat);
+        }
+        wire.say(9, Request::Command(Command::Stop));
+        let mut queues = Queues::new();
+        let (mut control, end) = queues.split();
+        settle(&mut Link::new(&mut wire, end));
+        assert_eq!(wire.answers(), [(7, Some(Refusal::Busy)), (8, Some(Refusal::Busy))]);
+        assert_eq!(control.take().map(|packet| packet.sequence), Some(9));
+        assert_eq!(control.take().map(|packet| packet.sequence), Some(0));
+    }
+
+    #[test]
+    fn replies_are_sent_whole_and_in_order() {
+        let mut wire = Wire::default();
+        let mut queues = Queues::new();
+        let (mut control, end) = queues.split();
+        for sequence in 0..5 {
+            control.post(Reply::Answer { sequence, refused: None });
+        }
+        settle(&mut Link::new(&mut wire, end));
+        let expected: Vec<_> = (0..5).map(|sequence| (sequence, None)).collect();
+        assert_eq!(wire.answers(), expected);
+    }
+
+    #[test]
+    fn what_is_no_request_is_refused_and_damage_is_counted() {
+        let mut wire = Wire::default();
+        let mut buffer = [0; 32];
+        let length = encode(&(1_u16, 77_u16, 200_u8), &mut buffer).unwrap().len();
+        wire.incoming.extend(&buffer[..length]);
+        buffer[2] ^= 1;
+        wire.incoming.extend(&buffer[..length]);
+        wire.say(78, Request::Heartbeat);
+        let mut queues = Queues::new();
+        let (mut control, end) = queues.split();
+        let mut link = Link::new(&mut wire, end);
+        settle(&mut link);
+        assert_eq!((link.counters().good, link.counters().refused()), (2, 1));
+        assert_eq!(wire.answers(), [(77, Some(Refusal::NotUnderstood))]);
+        assert_eq!(control.take().map(|packet| packet.sequence), Some(78));
+    }
+}

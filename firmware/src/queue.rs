@@ -1,0 +1,168 @@
+//! The queues between the control task and the link: bounded, without locks, and what does not fit is counted.
+//!
+//! The control task is an end of both. It never waits: an empty inbox is no packet in this tick, a full outbox is a
+//! record lost, and the number of those is in the next record.
+
+use crate::model::JOINTS;
+use blindgrasp_shared::command::Command;
+use blindgrasp_shared::link::message::{Packet, Reply, Request};
+use heapless::spsc::{Consumer, Producer, Queue};
+
+/// A packet to this hand.
+pub type HandPacket = Packet<JOINTS>;
+/// A reply of this hand.
+pub type HandReply = Reply<'static, JOINTS>;
+
+/// Packets that wait for a tick; the control task takes one a millisecond. A queue holds one less than its size.
+const PACKETS: usize = 8;
+/// Replies and records that wait for the line.
+const REPLIES: usize = 8;
+/// A second stop before the first is acted on says nothing new.
+const STOPS: usize = 2;
+
+/// Memory of all queues.
+pub struct Queues {
+    stops: Queue<HandPacket, STOPS>,
+    packets: Queue<HandPacket, PACKETS>,
+    replies: Queue<HandReply, REPLIES>,
+}
+
+impl Queues {
+    /// Empty queues.
+    pub const fn new() -> Self {
+        Self { stops: Queue::new(), packets: Queue::new(), replies: Queue::new() }
+    }
+
+    /// Their ends: the control task's, and the link's.
+    pub fn split(&mut self) -> (ControlEnd<'_>, LinkEnd<'_>) {
+        let (stops_in, stops) = self.stops.split();
+        let (packets_in, packets) = self.packets.split();
+        let (replies_in, replies) = self.replies.split();
+        (
+            ControlEnd { stops, packets, replies: replies_in, dropped: 0 },
+            LinkEnd { stops: stops_in, packets: packets_in, replies },
+        )
+    }
+}
+
+impl Default for Queues {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+/// The control task's end.
+pub struct ControlEnd<'q> {
+    stops: Consumer<'q, HandPacket>,
+    packets: Consumer<'q, HandPacket>,
+    replies: Producer<'q, HandReply>,
+    dropped: u32,
+}
+
+impl ControlEnd<'_> {
+    /// The packet for this tick. A stop overtakes whatever waits.
+    pub fn take(&mut self) -> Option<HandPacket> {
+        dequeue(&mut self.stops).or_else(|| dequeue(&mut self.packets))
+    }
+
+    /// Leaves a reply for the line, or drops and counts it.
+    pub fn post(&mut self, reply: HandReply) {
+        if enqueue(&mut self.replies, reply).is_err() {
+            self.dropped = self.dropped.saturating_add(1);
+        }
+    }
+
+    /// How many replies and records were dropped so far.
+    pub fn dropped(&self) -> u32 {
+        self.dropped
+    }
+}
+
+/// The link's end.
+pub struct LinkEnd<'q> {
+    stops: Producer<'q, HandPacket>,
+    packets: Producer<'q, HandPacket>,
+    replies: Consumer<'q, HandReply>,
+}
+
+impl LinkEnd<'_> {
+    /// Hands a packet to the control task.
+    ///
+    /// # Errors
+    /// The packet, if its queue is full.
+    pub fn put(&mut self, packet: HandPacket) -> Result<(), HandPacket> {
+        if matches!(packet.request, Request::Command(Command::Stop)) {
+            enqueue(&mut self.stops, packet)
+        } else {
+            enqueue(&mut self.packets, packet)
+        }
+    }
+
+    /// The next reply to send.
+    pub fn take(&mut self) -> Option<HandReply> {
+        dequeue(&mut self.replies)
+    }
+
+    /// Whether nothing waits to be sent.
+    pub fn is_empty(&self) -> bool {
+        self.replies.len() == 0
+    }
+}
+
+/// Whether a queue has a size of zero, which none has. The library divides by the size; with this asked first, the
+/// compiler sees that the division can't panic.
+const fn is_nothing(capacity: usize) -> bool {
+    capacity == usize::MAX
+}
+
+/// Adds an item at the end of a queue, without a panic.
+///
+/// # Errors
+/// The item, if the queue is full.
+pub fn enqueue<T>(queue: &mut Producer<'_, T>, item: T) -> Result<(), T> {
+    if is_nothing(queue.capacity()) { Err(item) } else { queue.enqueue(item) }
+}
+
+/// Takes the item at the front of a queue, without a panic.
+pub fn dequeue<T>(queue: &mut Consumer<'_, T>) -> Option<T> {
+    if is_nothing(queue.capacity()) { None } else { queue.dequeue() }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn packet(sequence: u16, request: Request<JOINTS>) -> HandPacket {
+        Packet { session: 1, sequence, request }
+    }
+
+    #[test]
+    fn a_stop_overtakes_packets_and_gets_in_when_their_queue_is_full() {
+        let mut queues = Queues::new();
+        let (mut control, mut link) = queues.split();
+        let most = (PACKETS - 1) as u16;
+        for sequence in 0..most {
+            assert!(link.put(packet(sequence, Request::Heartbeat)).is_ok());
+        }
+        let refused = link.put(packet(most, Request::Heartbeat)).map_err(|packet| packet.sequence);
+        assert_eq!(refused, Err(most));
+        assert!(link.put(packet(100, Request::Command(Command::Stop))).is_ok());
+        let order: std::vec::Vec<u16> = core::iter::from_fn(|| control.take()).map(|p| p.sequence).collect();
+        let expected: std::vec::Vec<u16> = core::iter::once(100).chain(0..most).collect();
+        assert_eq!(order, expected);
+    }
+
+    #[test]
+    fn replies_that_do_not_fit_are_counted_and_the_oldest_are_kept() {
+        let mut queues = Queues::new();
+        let (mut control, mut link) = queues.split();
+        for sequence in 0..REPLIES as u16 + 2 {
+            control.post(Reply::Answer { sequence, refused: None });
+        }
+        assert_eq!(control.dropped(), 3);
+        for expected in 0..REPLIES as u16 - 1 {
+            assert!(matches!(link.take(), Some(Reply::Answer { sequence, .. }) if sequence == expected));
+        }
+        assert!(link.is_empty());
+    }
+}

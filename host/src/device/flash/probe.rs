@@ -1,0 +1,219 @@
+//! The probe that is meant, and a session on the right chip.
+
+use super::Chip;
+use probe_rs::probe::list::{Accessibility, Lister, ProbeListItem};
+use probe_rs::probe::{DebugProbeError, DebugProbeInfo, DebugProbeSelector, Probe};
+use probe_rs::{MemoryInterface, Permissions, Session};
+use std::fmt::Write as _;
+
+/// Why there is no session.
+#[derive(Debug, thiserror::Error)]
+pub enum ProbeError {
+    /// What was asked for is no selector.
+    #[error(
+        "`{0}` does not select a probe; write VID:PID or VID:PID:SERIAL in hexadecimal, such as 0483:374b"
+    )]
+    BadSelector(String),
+    /// No probe is connected.
+    #[error(
+        "no debug probe found (ST-Link, J-Link, CMSIS-DAP, ...); check that its USB cable carries data and, on Linux, that \
+        udev rules let you use it (https://probe.rs/docs/getting-started/probe-setup)"
+    )]
+    None,
+    /// Probes are connected, but not that one.
+    #[error("no debug probe is `{selector}`; connected are: {}", .connected.join("; "))]
+    NoSuchProbe {
+        /// What was asked for.
+        selector: String,
+        /// What there is.
+        connected: Vec<String>,
+    },
+    /// There is more than one.
+    #[error("{} debug probes are connected; choose one with --probe: {}", .0.len(), .0.join("; "))]
+    Several(Vec<String>),
+    /// This user may not use it.
+    #[error(
+        "the debug probe {0} is there, but you may not use it; install the udev rules of \
+        https://probe.rs/docs/getting-started/probe-setup and plug it in again"
+    )]
+    NoPermission(String),
+    /// It does not open.
+    #[error("the debug probe {probe} cannot be opened; is another program using it?")]
+    Open {
+        /// Which.
+        probe: String,
+        /// Why.
+        source: DebugProbeError,
+    },
+    /// The chip does not answer as it should.
+    #[error(
+        "the debug probe {probe} finds no {chip}{voltage}; check supply, SWDIO, SWCLK, ground and reset, and --chip \
+        (under reset: {under_reset})"
+    )]
+    Attach {
+        /// Which probe.
+        probe: String,
+        /// Which chip.
+        chip: String,
+        /// What the probe measures of its supply.
+        voltage: String,
+        /// What happened in the second try, with reset held.
+        under_reset: String,
+        /// What happened in the first.
+        source: Box<probe_rs::Error>,
+    },
+    /// Another chip answers.
+    #[error(
+        "the connected chip is {found}, not {chip}; nothing was erased; check --chip, and which board is connected"
+    )]
+    OtherChip {
+        /// What it should be.
+        chip: String,
+        /// What it is.
+        found: String,
+    },
+    /// It breaks off.
+    #[error("the chip {0} stopped answering; check the wiring")]
+    Lost(String, #[source] Box<probe_rs::Error>),
+}
+
+/// The probe that is meant: the one that is selected, or the only one.
+///
+/// # Errors
+/// If there is none, or more than one.
+pub fn choose(lister: &Lister, selector: Option<&str>) -> Result<DebugProbeInfo, ProbeError> {
+    let all = lister.list_all_with_access();
+    if all.is_empty() {
+        return Err(ProbeError::None);
+    }
+    let matching: Vec<_> = match selector {
+        None => all.clone(),
+        Some(text) => {
+            let wanted: DebugProbeSelector =
+                text.parse().map_err(|_| ProbeError::BadSelector(text.to_owned()))?;
+            all.iter().filter(|item| wanted.matches_probe(&item.info)).cloned().collect()
+        }
+    };
+    match matching.as_slice() {
+        [] => {
+            let selector = selector.unwrap_or_default().to_owned();
+            Err(ProbeError::NoSuchProbe { selector, connected: describe_all(&all) })
+        }
+        [one] if one.accessibility == Accessibility::PermissionDenied => {
+            Err(ProbeError::NoPermission(describe(&one.info)))
+        }
+        [one] => Ok(one.info.clone()),
+        several => Err(ProbeError::Several(describe_all(several))),
+    }
+}
+
+fn describe_all(items: &[ProbeListItem]) -> Vec<String> {
+    items.iter().map(|item| describe(&item.info)).collect()
+}
+
+/// Its selector, and what it calls itself.
+pub fn describe(info: &DebugProbeInfo) -> String {
+    format!("{} ({})", DebugProbeSelector::from(info), info.identifier)
+}
+
+/// Connects to a chip, and checks that it is that chip. A chip that does not answer is tried again with its reset held,
+/// which helps against firmware that sleeps or has its debug pins in use.
+///
+/// # Errors
+/// If it is not there, or another one.
+pub fn attach(info: &DebugProbeInfo, chip: &Chip) -> Result<Session, ProbeError> {
+    let mut probe = open(info)?;
+    let voltage = match probe.get_target_voltage() {
+        Ok(Some(voltage_v)) => format!(" (its supply is at {voltage_v:.2} V)"),
+        _ => String::new(),
+    };
+    let permissions = Permissions::default;
+    let mut session = match probe.attach(chip.target().clone(), permissions()) {
+        Ok(session) => session,
+        Err(source) => match open(info)?.attach_under_reset(chip.target().clone(), permissions()) {
+            Ok(session) => session,
+            Err(second) => {
+                return Err(ProbeError::Attach {
+                    probe: describe(info),
+                    chip: chip.name().to_owned(),
+                    voltage,
+                    under_reset: chain(&second),
+                    source: Box::new(source),
+                });
+            }
+        },
+    };
+    check_device(&mut session, chip)?;
+    Ok(session)
+}
+
+fn open(info: &DebugProbeInfo) -> Result<Probe, ProbeError> {
+    info.open().map_err(|source| ProbeError::Open { probe: describe(info), source })
+}
+
+/// An error with its causes, in one line.
+fn chain(error: &dyn std::error::Error) -> String {
+    let mut text = error.to_string();
+    let mut cause = error.source();
+    while let Some(error) = cause {
+        let _ = write!(text, ": {error}");
+        cause = error.source();
+    }
+    text
+}
+
+/// DBGMCU_IDCODE of the STM32F4 (RM0090, 38.6.1): the device in its low 12 bits.
+const DBGMCU_IDCODE: u64 = 0xE004_2000;
+/// Size of the flash, KiB (RM0090, 39.2).
+const FLASH_SIZE_KIB: u64 = 0x1FFF_7A22;
+
+/// Devices of the STM32F4 family, with the start of the names of their chips (the section on the MCU device ID code of
+/// RM0090, RM0368, RM0383, RM0386, RM0390, RM0401, RM0402 and RM0430).
+const DEVICES: [(u16, &[&str]); 11] = [
+    (0x413, &["STM32F405", "STM32F407", "STM32F415", "STM32F417"]),
+    (0x419, &["STM32F427", "STM32F429", "STM32F437", "STM32F439"]),
+    (0x421, &["STM32F446"]),
+    (0x423, &["STM32F401CB", "STM32F401RB", "STM32F401VB", "STM32F401CC", "STM32F401RC", "STM32F401VC"]),
+    (0x431, &["STM32F411"]),
+    (0x433, &["STM32F401CD", "STM32F401RD", "STM32F401VD", "STM32F401CE", "STM32F401RE", "STM32F401VE"]),
+    (0x434, &["STM32F469", "STM32F479"]),
+    (0x441, &["STM32F412"]),
+    (0x458, &["STM32F410"]),
+    (0x463, &["STM32F413", "STM32F423"]),
+    // The first silicon of 0x413 told 0x411 (errata sheet of the STM32F40x, 2.1.1).
+    (0x411, &["STM32F405", "STM32F407", "STM32F415", "STM32F417"]),
+];
+
+/// Why a device is not a chip of this name and flash; nothing if it is, or if it cannot be told.
+///
+/// `idcode` is the word at DBGMCU_IDCODE, `flash_kib` the half-word that tells the size of the flash.
+pub fn contradiction(chip: &str, flash_bytes: u64, idcode: u32, flash_kib: u16) -> Option<String> {
+    let chip = chip.to_ascii_uppercase();
+    let is_of = |names: &[&str]| names.iter().any(|name| chip.starts_with(name));
+    if !DEVICES.iter().any(|(_, names)| is_of(names)) {
+        return None;
+    }
+    let device = (idcode & 0xFFF) as u16;
+    match DEVICES.iter().find(|(code, _)| *code == device) {
+        Some((_, names)) if is_of(names) => {}
+        Some((_, names)) => return Some(format!("a {} (device 0x{device:03x})", names.join(" or "))),
+        None => return Some(format!("unknown (device 0x{device:03x})")),
+    }
+    let smaller = u64::from(flash_kib) * 1024 < flash_bytes;
+    smaller.then(|| format!("a variant with {flash_kib} KiB of flash in place of {}", flash_bytes / 1024))
+}
+
+fn check_device(session: &mut Session, chip: &Chip) -> Result<(), ProbeError> {
+    let lost = |error| ProbeError::Lost(chip.name().to_owned(), Box::new(error));
+    if !chip.name().to_ascii_uppercase().starts_with("STM32F4") {
+        return Ok(());
+    }
+    let mut core = session.core(0).map_err(lost)?;
+    let idcode = core.read_word_32(DBGMCU_IDCODE).map_err(lost)?;
+    let flash_kib = core.read_word_16(FLASH_SIZE_KIB).map_err(lost)?;
+    let flash = &chip.memory().flash;
+    match contradiction(chip.name(), flash.end - flash.start, idcode, flash_kib) {
+        Some(found) => Err(ProbeError::OtherChip { chip: chip.name().to_owned(), found }),
+        None => Ok(()),
+    }
+}

@@ -1,0 +1,423 @@
+//! `blindgrasp flash` as a user meets it, as far as that goes without a microcontroller.
+
+#[cfg(feature = "probe")]
+mod elf;
+
+use std::fs;
+use std::path::PathBuf;
+use std::process::{Command, Output};
+
+/// A directory that goes with the test.
+struct Folder(PathBuf);
+
+impl Folder {
+    fn new(name: &str) -> Self {
+        let path = std::env::temp_dir().join(format!("blindgrasp-flash-{}-{name}", std::process::id()));
+        let _ = fs::remove_dir_all(&path);
+        fs::create_dir_all(&path).expect("a directory");
+        Self(path)
+    }
+
+    #[cfg(feature = "probe")]
+    fn write(&self, name: &str, bytes: &[u8]) -> String {
+        let path = self.0.join(name);
+        fs::create_dir_all(path.parent().expect("a parent")).expect("a directory");
+        fs::write(&path, bytes).expect("a file");
+        path.to_str().expect("UTF-8").to_owned()
+    }
+}
+
+impl Drop for Folder {
+    fn drop(&mut self) {
+        let _ = fs::remove_dir_all(&self.0);
+    }
+}
+
+fn blindgrasp(folder: &Folder, arguments: &[&str]) -> Output {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_blindgrasp"));
+    command.env("CARGO_TARGET_DIR", &folder.0).args(arguments).output().expect("the command starts")
+}
+
+/// Exit code 2, nothing on stdout, and one line on stderr with all of these words in it.
+fn assert_refused(folder: &Folder, arguments: &[&str], words: &[&str]) {
+    let output = blindgrasp(folder, arguments);
+    let error = String::from_utf8(output.stderr).expect("UTF-8");
+    assert_eq!(output.status.code(), Some(2), "{arguments:?}: {error}");
+    assert!(output.stdout.is_empty(), "{arguments:?}");
+    assert_eq!(error.lines().count(), 1, "{arguments:?}: {error}");
+    for word in words {
+        assert!(error.contains(word), "{arguments:?}: no `{word}` in: {error}");
+    }
+}
+
+#[cfg(not(feature = "probe"))]
+#[test]
+fn a_build_without_probes_says_how_to_get_one_with_them() {
+    let folder = Folder::new("without");
+    for arguments in [&["flash"][..], &["flash", "image", "--dry-run", "--json", "--verify"]] {
+        assert_refused(&folder, arguments, &["cargo run --release --features probe -- flash"]);
+    }
+}
+
+#[cfg(feature = "probe")]
+mod with_probes {
+    use super::elf::{Elf, FLASH, RAM, RAM_END, Segment, image};
+    use super::{Folder, assert_refused, blindgrasp};
+    use blindgrasp::device::flash::logs::{Line, Logs, LogsError};
+    use blindgrasp::device::flash::probe::{ProbeError, choose, contradiction};
+    use blindgrasp::device::flash::{Chip, ChipError};
+    use blindgrasp_shared::identity::Image;
+    use probe_rs::probe::list::{Accessibility, Lister, ProbeListItem, ProbeLister};
+    use probe_rs::probe::{
+        DebugProbe, DebugProbeError, DebugProbeInfo, DebugProbeSelector, Probe, ProbeCreationError,
+        ProbeFactory,
+    };
+    use serde_json::{Value, json};
+    use std::fmt;
+
+    /// No probe has this selector, so that no test ever flashes what happens to be connected.
+    const NO_PROBE: &str = "dead:beef:blindgrasp-test";
+
+    #[test]
+    fn a_dry_run_tells_what_the_image_is_and_takes() {
+        let folder = Folder::new("dry");
+        let path = folder.write("hand", &Elf::good(&image()).bytes());
+        let output = blindgrasp(&folder, &["flash", &path, "--dry-run", "--json"]);
+        assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
+        assert!(output.stderr.is_empty());
+        let report: Value = serde_json::from_slice(&output.stdout).expect("one JSON object");
+        let flash_bytes = Elf::good(&image()).segments[0].bytes.len() + 64;
+        let expected = json!({
+            "image": path,
+            "chip": "STM32F405RGTx",
+            "kind": "hand",
+            "hand": "three-finger",
+            "hand_hash": "01234567",
+            "hand_checked": false,
+            "interface_version": image().interface_version,
+            "firmware_version": "0.1.0",
+            "build_hash": "89abcdef",
+            "joint_count": 12,
+            "fingertip_count": 3,
+            "period_us": 1000,
+            "flash": { "used_bytes": flash_bytes, "available_bytes": 1024 * 1024 },
+            "ram": { "used_bytes": 4096, "available_bytes": 128 * 1024 },
+            "stack_bytes": 124 * 1024,
+            "flashed": false,
+            "verified": false,
+        });
+        assert_eq!(report, expected);
+
+        let output = blindgrasp(&folder, &["flash", &path, "--dry-run"]);
+        let table = String::from_utf8(output.stdout).expect("UTF-8");
+        for words in [
+            "three-finger (01234567",
+            "12 joints",
+            "of 1024.0 KiB",
+            "4.0 KiB of 128.0 KiB (3.1 %)",
+            "124.0 KiB",
+            "checked only",
+        ] {
+            assert!(table.contains(words), "no `{words}` in: {table}");
+        }
+    }
+
+    #[test]
+    fn the_image_that_was_built_last_is_the_default() {
+        let folder = Folder::new("default");
+        assert_refused(
+            &folder,
+            &["flash", "--dry-run"],
+            &["no image", "thumbv7em-none-eabihf/firmware/hand", "tests/firmware-toolchain cargo build"],
+        );
+        let path = folder.write("debian/thumbv7em-none-eabihf/firmware/hand", &Elf::good(&image()).bytes());
+        let output = blindgrasp(&folder, &["flash", "--dry-run", "--json"]);
+        let report: Value = serde_json::from_slice(&output.stdout).expect("one JSON object");
+        assert_eq!(report["image"], Value::from(path));
+    }
+
+    #[test]
+    fn images_are_refused_with_the_reason() {
+        let folder = Folder::new("refused");
+        let refuse = |bytes: &[u8], words: &[&str]| {
+            let path = folder.write("image", bytes);
+            for more in [&["--dry-run"][..], &["--probe", NO_PROBE]] {
+                assert_refused(&folder, &[&["flash", &path], more].concat(), words);
+            }
+        };
+        let good = Elf::good(&image());
+        refuse(b"not an image", &["image", "not an ELF file"]);
+        refuse(&good.bytes()[..300], &["cut short or damaged", "build it again"]);
+        refuse(
+            &Elf { machine: 3, ..good.clone() }.bytes(),
+            &["built for x86", "--target thumbv7em-none-eabihf"],
+        );
+        refuse(&Elf::good(&Image { kind: "pil", ..image() }).bytes(), &["`pil`", "flash the image `hand`"]);
+        let mut nameless = good.clone();
+        nameless.segments[0].bytes.truncate(0x200);
+        refuse(&nameless.bytes(), &["no identity", "cargo build"]);
+        let mut large = good.clone();
+        large.segments[0].bytes.resize(1024 * 1024, 0);
+        large.segments[0].memory_bytes = 1024 * 1024;
+        large.segments[1].stored = FLASH + 1024 * 1024;
+        refuse(&large.bytes(), &["on STM32F405RGTx", "needs 1048640 bytes of flash", "has 1048576"]);
+        let mut hungry = good.clone();
+        hungry.segments[2].memory_bytes = 128 * 1024;
+        refuse(&hungry.bytes(), &["need 131136 bytes of RAM", "has 131072"]);
+        refuse(&good.clone().with_word(1, RAM | 1).bytes(), &["reset vector is 0x20000001"]);
+    }
+
+    #[test]
+    fn files_and_chips_that_are_not_there_are_named() {
+        let folder = Folder::new("missing");
+        let path = folder.write("image", &Elf::good(&image()).bytes());
+        assert_refused(
+            &folder,
+            &["flash", "nowhere/hand", "--dry-run"],
+            &["cannot read the image nowhere/hand"],
+        );
+        assert_refused(&folder, &["flash", "/", "--dry-run"], &["/ is no image"]);
+        let chip = |name| ["flash", path.as_str(), "--dry-run", "--chip", name];
+        assert_refused(
+            &folder,
+            &chip("STM32F405RX"),
+            &["no chip is called `STM32F405RX`; did you mean STM32F405RG?"],
+        );
+        assert_refused(&folder, &chip("abacus"), &["no chip is called `abacus`", "such as STM32F405RGTx"]);
+        assert_refused(&folder, &chip("GD32VF103CB"), &["no Arm core"]);
+    }
+
+    #[test]
+    fn a_smaller_chip_is_told_apart() {
+        // STM32F401RB: 128 KiB of flash, 64 KiB of RAM.
+        let folder = Folder::new("smaller");
+        let path = folder.write("image", &Elf::good(&image()).bytes());
+        let small = ["flash", path.as_str(), "--dry-run", "--chip", "STM32F401RBTx"];
+        assert_refused(&folder, &small, &["stack pointer 0x20020000", "--chip"]);
+        let path = folder.write("small", &Elf::good(&image()).with_word(0, RAM + 0x1_0000).bytes());
+        let small = ["flash", path.as_str(), "--dry-run", "--json", "--chip", "STM32F401RBTx"];
+        let report: Value =
+            serde_json::from_slice(&blindgrasp(&folder, &small).stdout).expect("one JSON object");
+        assert_eq!(report["flash"]["available_bytes"], 128 * 1024);
+        assert_eq!(report["ram"]["available_bytes"], 64 * 1024);
+    }
+
+    #[test]
+    fn the_hand_of_the_image_is_compared_with_the_file() {
+        let folder = Folder::new("hand");
+        let path = folder.write("image", &Elf::good(&Image { hand: "another", ..image() }).bytes());
+        let model = concat!(env!("CARGO_MANIFEST_DIR"), "/../models/hands/three-finger.toml");
+        let arguments = ["flash", path.as_str(), "--dry-run", "--hand", model];
+        assert_refused(&folder, &arguments, &["for the hand `another`, not for `three-finger`"]);
+        let path = folder.write("image", &Elf::good(&image()).bytes());
+        let arguments = ["flash", path.as_str(), "--dry-run", "--hand", model];
+        assert_refused(&folder, &arguments, &["hash 01234567", "build the image again"]);
+        let arguments = ["flash", path.as_str(), "--dry-run", "--hand", "nowhere.toml"];
+        assert_refused(&folder, &arguments, &["nowhere.toml"]);
+    }
+
+    #[test]
+    fn without_a_probe_that_is_said() {
+        let folder = Folder::new("probe");
+        let path = folder.write("image", &Elf::good(&image()).bytes());
+        // Which of the two depends on what is connected to this machine.
+        assert_refused(&folder, &["flash", &path, "--probe", NO_PROBE], &["no debug probe"]);
+    }
+
+    #[test]
+    fn monitoring_needs_logs_in_the_image() {
+        let folder = Folder::new("monitor");
+        let path = folder.write("image", &Elf::good(&image()).bytes());
+        assert_refused(&folder, &["flash", &path, "--monitor", "--probe", NO_PROBE], &["no defmt logs"]);
+        let mut elf = with_logs("rzcobs");
+        elf.symbols.remove(0);
+        let path = folder.write("image", &elf.bytes());
+        assert_refused(&folder, &["flash", &path, "--monitor", "--probe", NO_PROBE], &["_SEGGER_RTT"]);
+    }
+
+    #[test]
+    fn probe_rs_itself_would_write_where_nothing_may_be_written() {
+        // Which is why it is not asked alone: bytes there can be written once, and never again.
+        let chip = Chip::by_name("STM32F405RGTx").expect("known");
+        let mut elf = Elf::good(&image());
+        elf.segments.push(Segment {
+            stored: 0x1FFF_7800,
+            used: 0x1FFF_7800,
+            bytes: vec![0; 4],
+            memory_bytes: 4,
+        });
+        let file = elf.bytes();
+        let firmware = blindgrasp::device::image::Firmware::parse(&file).expect("an image");
+        assert!(matches!(chip.check(&firmware), Err(ChipError::Fit(_))));
+        assert_eq!(chip.memory().flash, 0x0800_0000..0x0810_0000);
+        assert!(chip.memory().ram.contains(&(u64::from(RAM)..u64::from(RAM_END))));
+    }
+
+    #[test]
+    fn another_chip_is_recognised() {
+        let kib = |size: u64| size * 1024;
+        // Revision in the high half.
+        assert_eq!(contradiction("STM32F405RGTx", kib(1024), 0x1007_6413, 1024), None);
+        assert_eq!(contradiction("stm32f405rgtx", kib(1024), 0x2000_6411, 1024), None);
+        let found = contradiction("STM32F405RGTx", kib(1024), 0x1007_6413, 512).expect("other");
+        assert_eq!(found, "a variant with 512 KiB of flash in place of 1024");
+        let found = contradiction("STM32F405RGTx", kib(1024), 0x1001_6433, 512).expect("other");
+        assert!(found.contains("STM32F401RE") && found.contains("0x433"), "{found}");
+        assert_eq!(contradiction("STM32F401RETx", kib(512), 0x1001_6433, 512), None);
+        let found = contradiction("STM32F405RGTx", kib(1024), 0, 0).expect("other");
+        assert_eq!(found, "unknown (device 0x000)");
+        // Of a chip that is not in the table, nothing is known.
+        assert_eq!(contradiction("STM32F205RGTx", kib(1024), 0x413, 1024), None);
+    }
+
+    /// Probes that are only listed.
+    #[derive(Debug)]
+    struct Listed(Vec<ProbeListItem>);
+
+    impl ProbeLister for Listed {
+        fn open(&self, _: &DebugProbeSelector) -> Result<Probe, DebugProbeError> {
+            Err(DebugProbeError::ProbeCouldNotBeCreated(ProbeCreationError::NotFound))
+        }
+
+        fn list_with_access(&self, _: Option<&DebugProbeSelector>) -> Vec<ProbeListItem> {
+            self.0.clone()
+        }
+    }
+
+    #[derive(Debug)]
+    struct Maker;
+
+    impl fmt::Display for Maker {
+        fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+            write!(f, "listed")
+        }
+    }
+
+    impl ProbeFactory for Maker {
+        fn open(&self, _: &DebugProbeSelector) -> Result<Box<dyn DebugProbe>, DebugProbeError> {
+            Err(DebugProbeError::ProbeCouldNotBeCreated(ProbeCreationError::NotFound))
+        }
+
+        fn list_probes(&self) -> Vec<ProbeListItem> {
+            Vec::new()
+        }
+    }
+
+    fn listed(serials: &[&str], accessibility: Accessibility) -> Lister {
+        let item = |serial: &&str| ProbeListItem {
+            info: DebugProbeInfo::new(
+                "STLink V2-1",
+                0x0483,
+                0x374b,
+                Some((*serial).to_owned()),
+                &Maker,
+                None,
+                false,
+            ),
+            accessibility,
+        };
+        Lister::with_lister(Box::new(Listed(serials.iter().map(item).collect())))
+    }
+
+    #[test]
+    fn the_probe_that_is_meant_is_found() {
+        let usable = |serials| listed(serials, Accessibility::Accessible);
+        assert!(matches!(choose(&usable(&[]), None), Err(ProbeError::None)));
+        assert!(matches!(choose(&usable(&[]), Some("0483:374b")), Err(ProbeError::None)));
+        assert_eq!(choose(&usable(&["A"]), None).expect("one").serial_number.as_deref(), Some("A"));
+
+        let two = usable(&["A", "B"]);
+        let error = choose(&two, None).expect_err("two").to_string();
+        assert!(error.contains("--probe: 0483:374b:A (STLink V2-1); 0483:374b:B"), "{error}");
+        assert!(matches!(choose(&two, Some("0483:374b")), Err(ProbeError::Several(_))));
+        let chosen = choose(&two, Some("0483:374b:B")).expect("the second");
+        assert_eq!(chosen.serial_number.as_deref(), Some("B"));
+        let error = choose(&two, Some("0483:374b:C")).expect_err("no such").to_string();
+        assert!(error.contains("no debug probe is `0483:374b:C`; connected are: 0483:374b:A"), "{error}");
+        for text in ["", "stlink", "0483", "0483:xyz", "0483:374b-x"] {
+            assert!(matches!(choose(&two, Some(text)), Err(ProbeError::BadSelector(_))), "{text}");
+        }
+
+        let forbidden = listed(&["A"], Accessibility::PermissionDenied);
+        let error = choose(&forbidden, None).expect_err("no permission").to_string();
+        assert!(error.contains("0483:374b:A") && error.contains("udev"), "{error}");
+    }
+
+    /// An image that logs: `info` 1 with a number, `error` 2, and a time stamp of microseconds.
+    fn with_logs(encoding: &str) -> Elf {
+        let entry = |tag: &str, data: &str, address: u32| {
+            let symbol = json!({ "package": "p", "tag": tag, "data": data, "disambiguator": address.to_string(), "crate_name": "p" });
+            (symbol.to_string(), address, true)
+        };
+        let mut elf = Elf::good(&image());
+        elf.symbols.extend([
+            ("_defmt_version_ = 4".to_owned(), 0, false),
+            (format!("_defmt_encoding_ = {encoding}"), 0, false),
+            entry("defmt_info", "joint {=u8} is ready", 1),
+            entry("defmt_error", "stopped", 2),
+            entry("defmt_timestamp", "{=u32:us}", 3),
+        ]);
+        elf
+    }
+
+    fn lines(logs: &Logs, chunks: &[&[u8]]) -> (Vec<String>, u64) {
+        let mut decoder = logs.decoder();
+        let mut lines = Vec::new();
+        for chunk in chunks {
+            decoder.push(chunk, |line: Line| lines.push(line.to_string()));
+        }
+        (lines, decoder.damaged_frames())
+    }
+
+    /// Reverse zero-compressing COBS of a frame of at most seven bytes, one of them zero: the bytes that are not zero,
+    /// then a byte that says which are.
+    fn rzcobs(frame: &[u8]) -> Vec<u8> {
+        let mut bytes: Vec<u8> = frame.iter().copied().filter(|&byte| byte != 0).collect();
+        let zero = |index: usize| frame.get(index).copied().unwrap_or(0) == 0;
+        bytes.push((0..7).map(|index| u8::from(zero(index)) << index).sum());
+        bytes.push(0);
+        bytes
+    }
+
+    #[test]
+    fn logs_are_decoded_as_they_come() {
+        let frames = [[1, 0, 0x40, 0x42, 0x0f, 0, 7].as_slice(), &[2, 0, 0x80, 0x84, 0x1e, 0]];
+        let expected = ["1.000000 info  joint 7 is ready", "2.000000 error stopped"];
+
+        let logs = Logs::parse(&with_logs("raw").bytes()).expect("a table");
+        assert_eq!(lines(&logs, &[&frames.concat()]), (expected.map(str::to_owned).to_vec(), 0));
+
+        let logs = Logs::parse(&with_logs("rzcobs").bytes()).expect("a table");
+        let stream = [rzcobs(frames[0]), rzcobs(frames[1])].concat();
+        for cut in 0..stream.len() {
+            let (start, end) = stream.split_at(cut);
+            assert_eq!(
+                lines(&logs, &[start, end]),
+                (expected.map(str::to_owned).to_vec(), 0),
+                "cut at {cut}"
+            );
+        }
+    }
+
+    #[test]
+    fn damaged_logs_are_counted_and_the_next_line_is_right() {
+        let logs = Logs::parse(&with_logs("rzcobs").bytes()).expect("a table");
+        let good = rzcobs(&[2, 0, 0x80, 0x84, 0x1e, 0]);
+        // A line that is not in the table, and one whose beginning was overwritten.
+        let unknown = rzcobs(&[9, 0, 1, 1, 1, 0]);
+        let cut = rzcobs(&[1, 0, 0x40, 0x42, 0x0f, 0, 7]).split_off(3);
+        let (lines, damaged_frames) = lines(&logs, &[&unknown, &good, &cut, &good]);
+        assert_eq!((lines.len(), damaged_frames), (2, 2), "{lines:?}");
+        assert!(lines.iter().all(|line| line.ends_with("error stopped")), "{lines:?}");
+    }
+
+    #[test]
+    fn an_image_without_logs_or_with_newer_ones_is_refused() {
+        assert!(matches!(Logs::parse(&Elf::good(&image()).bytes()), Err(LogsError::None)));
+        let mut newer = with_logs("rzcobs");
+        newer.symbols[1].0 = "_defmt_version_ = 99".to_owned();
+        let Err(error) = Logs::parse(&newer.bytes()) else { panic!("decoded") };
+        assert!(error.to_string().contains("99"), "{error}");
+        assert!(!error.to_string().contains('\n'), "{error}");
+    }
+}

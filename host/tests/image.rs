@@ -1,0 +1,288 @@
+//! Firmware images, judged without a probe: what is flashed, and what is refused for which reason.
+
+mod elf;
+
+use blindgrasp::device::image::{
+    ExpectedHand, Firmware, FitError, Footprint, ImageError, LEAST_STACK_BYTES, Memory, PurposeError,
+};
+use blindgrasp_shared::identity::Image;
+use blindgrasp_shared::telemetry::INTERFACE_VERSION;
+use elf::{Elf, FLASH, RAM, RAM_END, RESET, Segment, identity, image};
+
+/// The memory of an STM32F405RG: 1 MiB of flash, 64 KiB of RAM beside the core, 112 + 16 KiB of RAM.
+fn stm32f405() -> Memory {
+    let ram = vec![0x2001_C000..0x2002_0000, 0x1000_0000..0x1001_0000, 0x2000_0000..0x2001_C000];
+    Memory::new(0x0800_0000..0x0810_0000, ram)
+}
+
+fn refusal(elf: &Elf) -> ImageError {
+    Firmware::parse(&elf.bytes()).expect_err("refused")
+}
+
+fn misfit(elf: &Elf) -> FitError {
+    let file = elf.bytes();
+    Firmware::parse(&file).expect("an image").footprint(&stm32f405()).expect_err("refused")
+}
+
+fn purpose(image: &Image<'_>, hand: Option<&ExpectedHand>) -> Result<(), PurposeError> {
+    let file = Elf::good(image).bytes();
+    Firmware::parse(&file).expect("an image").check_purpose(hand)
+}
+
+#[test]
+fn a_good_image_is_understood() {
+    let elf = Elf::good(&image());
+    let file = elf.bytes();
+    let firmware = Firmware::parse(&file).expect("an image");
+    assert_eq!(firmware.image, image());
+    assert_eq!(firmware.rtt_control_block, Some(u64::from(RAM) + 16));
+    let code = elf.segments[0].bytes.len() as u64;
+    let stored: Vec<_> = firmware.stored().map(|(address, bytes)| (address, bytes.len() as u64)).collect();
+    assert_eq!(stored, [(u64::from(FLASH), code), (u64::from(FLASH) + code, 64)]);
+    let footprint = firmware.footprint(&stm32f405()).expect("it fits");
+    let expected = Footprint {
+        flash_used_bytes: code + 64,
+        flash_bytes: 1024 * 1024,
+        ram_used_bytes: 4096,
+        // The RAM beside the core is not used.
+        ram_bytes: 128 * 1024,
+        stack_bytes: 124 * 1024,
+        stack_pointer: u64::from(RAM_END),
+        reset_address: u64::from(RESET),
+    };
+    assert_eq!(footprint, expected);
+}
+
+#[test]
+fn memory_that_touches_is_one() {
+    assert_eq!(stm32f405().ram, [0x1000_0000..0x1001_0000, 0x2000_0000..0x2002_0000]);
+}
+
+#[test]
+fn what_is_no_elf_file_is_refused() {
+    for bytes in [&b""[..], b"\x7fEL", b"MZ and so on", &[0xff; 5000]] {
+        assert_eq!(Firmware::parse(bytes).expect_err("refused"), ImageError::NotElf);
+    }
+}
+
+#[test]
+fn a_file_cut_short_anywhere_is_refused() {
+    let file = Elf::good(&image()).bytes();
+    for length in 4..file.len() {
+        let error = Firmware::parse(&file[..length]).expect_err("refused");
+        assert!(matches!(error, ImageError::Damaged(_)), "{length}: {error}");
+    }
+}
+
+#[test]
+fn a_file_with_random_damage_is_judged_without_a_panic() {
+    let good = Elf::good(&image()).bytes();
+    let mut random = fastrand::Rng::with_seed(1);
+    let (mut refused, mut accepted) = (0, 0);
+    for _ in 0..5000 {
+        let mut file = good.clone();
+        for _ in 0..random.usize(1..8) {
+            // Half of them in the headers.
+            let end = if random.bool() { 148 } else { file.len() };
+            file[random.usize(..end)] = random.choice([0, 1, 0x7f, 0x80, 0xff]).unwrap_or(0);
+        }
+        let judged = Firmware::parse(&file).is_ok_and(|firmware| {
+            let _ = firmware.check_purpose(None);
+            firmware.footprint(&stm32f405()).is_ok()
+        });
+        *if judged { &mut accepted } else { &mut refused } += 1;
+    }
+    assert!(refused > 1000 && accepted > 100, "{refused} refused, {accepted} accepted");
+}
+
+#[test]
+fn another_processor_is_named() {
+    let intel = Elf { machine: 3, ..Elf::good(&image()) };
+    assert!(refusal(&intel).to_string().contains("built for x86 (32-bit, little-endian)"));
+    // The program that runs this test, on most machines.
+    let mut wide = vec![0; 64];
+    wide[..8].copy_from_slice(b"\x7fELF\x02\x01\x01\0");
+    wide[16] = 2;
+    wide[18] = 62;
+    wide[20] = 1;
+    wide[52] = 64;
+    let error = Firmware::parse(&wide).expect_err("refused").to_string();
+    assert!(error.contains("built for x86-64 (64-bit, little-endian)"), "{error}");
+    let mut big = Elf::good(&image()).bytes();
+    big[5] = 2;
+    let error = Firmware::parse(&big).expect_err("refused").to_string();
+    assert!(error.contains("big-endian"), "{error}");
+}
+
+#[test]
+fn an_object_file_is_refused() {
+    assert_eq!(refusal(&Elf { kind: 1, ..Elf::good(&image()) }), ImageError::NotAProgram);
+}
+
+#[test]
+fn an_image_must_have_one_identity() {
+    let mut elf = Elf::good(&image());
+    elf.segments[0].bytes.truncate(0x200);
+    assert_eq!(refusal(&elf), ImageError::NoIdentity);
+    // The beginning of one alone.
+    elf.segments[0].bytes.extend(Image::MAGIC);
+    elf.segments[0].memory_bytes = elf.segments[0].bytes.len() as u32;
+    elf.segments.truncate(1);
+    assert_eq!(refusal(&elf), ImageError::UnreadableIdentity);
+
+    let twice = |second: &Image<'_>| {
+        let mut elf = Elf::good(&image());
+        elf.segments[1].bytes = identity(second);
+        elf.segments[1].memory_bytes = 200;
+        elf
+    };
+    assert!(Firmware::parse(&twice(&image()).bytes()).is_ok());
+    let pil = Image { kind: "pil", ..image() };
+    let (first, second) = ("hand for three-finger".to_owned(), "pil for three-finger".to_owned());
+    assert_eq!(refusal(&twice(&pil)), ImageError::SeveralIdentities { first, second });
+}
+
+#[test]
+fn an_identity_that_is_not_loaded_does_not_count() {
+    let mut file = {
+        let mut elf = Elf::good(&image());
+        elf.segments[0].bytes.truncate(0x200);
+        elf.bytes()
+    };
+    file.extend(identity(&image()));
+    assert_eq!(Firmware::parse(&file).expect_err("refused"), ImageError::NoIdentity);
+}
+
+#[test]
+fn an_image_without_anything_to_load_is_refused() {
+    let mut elf = Elf::good(&image());
+    elf.segments.drain(..2);
+    assert_eq!(refusal(&elf), ImageError::NothingToLoad);
+}
+
+#[test]
+fn segments_that_overlap_are_refused() {
+    let mut elf = Elf::good(&image());
+    elf.segments[1].stored -= 1;
+    let (first, second) = (u64::from(FLASH), u64::from(elf.segments[1].stored));
+    assert_eq!(refusal(&elf), ImageError::Overlap { first, second });
+}
+
+#[test]
+fn only_the_image_for_this_hand_is_flashed() {
+    let hand = ExpectedHand { name: "three-finger".to_owned(), hash: 0x0123_4567 };
+    assert_eq!(purpose(&image(), None), Ok(()));
+    assert_eq!(purpose(&image(), Some(&hand)), Ok(()));
+
+    let other = ExpectedHand { name: "two-finger".to_owned(), ..hand.clone() };
+    let error =
+        PurposeError::OtherHand { image: "three-finger".to_owned(), expected: "two-finger".to_owned() };
+    assert_eq!(purpose(&image(), Some(&other)), Err(error));
+    let changed = ExpectedHand { hash: 0x0123_4568, ..hand };
+    let error = PurposeError::ChangedHand {
+        hand: "three-finger".to_owned(),
+        image: 0x0123_4567,
+        expected: 0x0123_4568,
+    };
+    assert_eq!(purpose(&image(), Some(&changed)), Err(error));
+
+    assert_eq!(purpose(&Image { kind: "pil", ..image() }, None), Err(PurposeError::Emulation));
+    let odd = Image { kind: "boot\n", ..image() };
+    assert_eq!(purpose(&odd, None), Err(PurposeError::OtherKind("boot\\n".to_owned())));
+    let newer = Image { interface_version: INTERFACE_VERSION + 1, ..image() };
+    assert_eq!(purpose(&newer, None), Err(PurposeError::OtherInterface(INTERFACE_VERSION + 1)));
+}
+
+#[test]
+fn flash_is_filled_to_the_last_byte_and_no_further() {
+    let filled = |size: u32| {
+        let mut elf = Elf::good(&image());
+        elf.segments[0].bytes.resize(size as usize - 64, 0);
+        elf.segments[0].memory_bytes = size - 64;
+        elf.segments[1].stored = FLASH + size - 64;
+        elf
+    };
+    let file = filled(1024 * 1024).bytes();
+    let footprint = Firmware::parse(&file).expect("an image").footprint(&stm32f405()).expect("it fits");
+    assert_eq!(footprint.flash_used_bytes, footprint.flash_bytes);
+    let error = FitError::FlashTooSmall { needed_bytes: 1024 * 1024 + 4, available_bytes: 1024 * 1024 };
+    assert_eq!(misfit(&filled(1024 * 1024 + 4)), error);
+}
+
+#[test]
+fn nothing_is_stored_outside_the_flash_that_the_chip_boots_from() {
+    // RAM, which forgets; and the one-time-programmable bytes, which never do.
+    for stored in [RAM, 0x1FFF_7800] {
+        let mut elf = Elf::good(&image());
+        elf.segments[1].stored = stored;
+        let stored = u64::from(stored)..u64::from(stored) + 64;
+        assert_eq!(misfit(&elf), FitError::NotInFlash { stored, flash: 0x0800_0000..0x0810_0000 });
+    }
+}
+
+#[test]
+fn variables_must_fit_and_leave_a_stack() {
+    let with = |used: u32, memory_bytes: u32| {
+        let mut elf = Elf::good(&image());
+        elf.segments.push(Segment { stored: used, used, bytes: vec![], memory_bytes });
+        elf
+    };
+    let error = FitError::RamTooSmall {
+        needed_bytes: 128 * 1024 + 8,
+        available_bytes: 128 * 1024,
+        start: u64::from(RAM),
+    };
+    assert_eq!(misfit(&with(RAM + 4096, 124 * 1024 + 8)), error);
+    assert_eq!(misfit(&with(0x3000_0000, 8)), FitError::NotInRam { address: 0x3000_0000 });
+
+    // Up to what the stack must have.
+    let room = 124 * 1024 - LEAST_STACK_BYTES as u32;
+    let file = with(RAM + 4096, room).bytes();
+    let footprint = Firmware::parse(&file).expect("an image").footprint(&stm32f405()).expect("it fits");
+    assert_eq!(footprint.stack_bytes, LEAST_STACK_BYTES);
+    let stack_pointer = u64::from(RAM_END);
+    let error = FitError::NoRoomForStack { room_bytes: LEAST_STACK_BYTES - 8, stack_pointer };
+    assert_eq!(misfit(&with(RAM + 4096, room + 8)), error);
+    // The stack would start in the middle of them.
+    let error = FitError::NoRoomForStack { room_bytes: 0, stack_pointer: u64::from(RAM) + 512 };
+    assert_eq!(misfit(&Elf::good(&image()).with_word(0, RAM + 512)), error);
+}
+
+#[test]
+fn a_stack_below_the_variables_is_understood() {
+    // As flip-link lays it out: a stack that runs over leaves the RAM and faults.
+    let mut elf = Elf::good(&image()).with_word(0, RAM_END - 4096);
+    elf.segments[1].used = RAM_END - 4096;
+    elf.segments[2].used = RAM_END - 4096 + 64;
+    let file = elf.bytes();
+    let footprint = Firmware::parse(&file).expect("an image").footprint(&stm32f405()).expect("it fits");
+    assert_eq!((footprint.ram_used_bytes, footprint.stack_bytes), (4096, 124 * 1024));
+    // Nothing below it.
+    let elf = Elf::good(&image()).with_word(0, RAM);
+    assert_eq!(misfit(&elf), FitError::BadStackPointer(u64::from(RAM)));
+}
+
+#[test]
+fn the_vector_table_must_lead_into_the_image() {
+    let good = || Elf::good(&image());
+    for stack_pointer in [0, 4, RAM_END + 8, RAM_END - 4, 0xffff_fff8] {
+        let error = FitError::BadStackPointer(u64::from(stack_pointer));
+        assert_eq!(misfit(&good().with_word(0, stack_pointer)), error);
+    }
+    // Without the Thumb bit; in RAM; beyond what is loaded; nowhere.
+    for reset in [RESET, RAM | 1, FLASH + 0x1_0001, 0, 1, 0xffff_ffff] {
+        let error = FitError::BadResetVector(u64::from(reset));
+        assert_eq!(misfit(&good().with_word(1, reset)), error);
+    }
+    let mut elsewhere = good();
+    for segment in &mut elsewhere.segments[..2] {
+        segment.stored += 0x4000;
+    }
+    assert_eq!(misfit(&elsewhere), FitError::NoVectorTable(u64::from(FLASH)));
+    let mut short = good();
+    let rest = short.segments[0].bytes.split_off(4);
+    short.segments[0].memory_bytes = 4;
+    let memory_bytes = rest.len() as u32;
+    short.segments.push(Segment { stored: FLASH + 4, used: FLASH + 4, bytes: rest, memory_bytes });
+    assert_eq!(misfit(&short), FitError::NoVectorTable(u64::from(FLASH)));
+}

@@ -1,0 +1,415 @@
+//! The device: sessions, requests and settings around the tick.
+
+mod common;
+
+use blindgrasp_shared::command::{Command, Grasp, Refusal};
+use blindgrasp_shared::device::{Device, Inputs, Outputs, Reading};
+use blindgrasp_shared::event::Event;
+use blindgrasp_shared::fault::{Fault, Raised};
+use blindgrasp_shared::identity::{Clock, Identity, Image, ResetCause, UNITS};
+use blindgrasp_shared::link::message::{Packet, Reply, Request, Sample, Signals, not_understood};
+use blindgrasp_shared::link::{self, Receiver, most_bytes};
+use blindgrasp_shared::settings::{Each, Parameter};
+use blindgrasp_shared::supervisor::Mode;
+use blindgrasp_shared::telemetry::{INTERFACE_VERSION, List, Record};
+use common::{JOINTS, config, facing_counts, params};
+use proptest::prelude::*;
+
+type Packet12 = Packet<12>;
+
+fn identity(clock: Clock) -> Identity<'static> {
+    let image = Image {
+        interface_version: INTERFACE_VERSION,
+        kind: "hand",
+        hand: "test",
+        hand_hash: 1,
+        firmware_version: "0.1.0",
+        build_hash: 2,
+        joint_count: 12,
+        fingertip_count: 3,
+        period_us: 1000,
+    };
+    Identity { image, units: UNITS, clock, reset: ResetCause::PowerOn, crash: None }
+}
+
+/// A device and a host that numbers its requests.
+struct Bench {
+    device: Device<12, 3>,
+    session: u16,
+    sequence: u16,
+}
+
+impl Bench {
+    /// Nobody has said hello yet.
+    fn silent(clock: Clock) -> Self {
+        let mut config = config();
+        config.faults.heartbeat_ms = Some(100);
+        Self { device: Device::new(params(&config), identity(clock)), session: 0, sequence: 0 }
+    }
+
+    /// In a session.
+    fn new() -> Self {
+        let mut bench = Self::silent(Clock::External);
+        let reply = bench.ask(Request::Hello { interface_version: INTERFACE_VERSION });
+        let Reply::Identity { session, .. } = reply else { panic!("{reply:?}") };
+        bench.session = session;
+        bench
+    }
+
+    fn tick(&mut self, packet: Option<Packet12>) -> Outputs<12> {
+        let reading = Reading::Counts(facing_counts());
+        self.device.tick(&Inputs { reading, late: false, cycles: 7, dropped: 3, packet })
+    }
+
+    fn packet(&mut self, request: Request<12>) -> Packet12 {
+        self.sequence = self.sequence.wrapping_add(1);
+        Packet { session: self.session, sequence: self.sequence, request }
+    }
+
+    fn ask(&mut self, request: Request<12>) -> Reply<'static, 12> {
+        let packet = self.packet(request);
+        self.tick(Some(packet)).reply.expect("every request is answered")
+    }
+
+    /// What a request is refused for.
+    #[track_caller]
+    fn refused(&mut self, request: Request<12>) -> Option<Refusal> {
+        match self.ask(request) {
+            Reply::Answer { sequence, refused } => {
+                assert_eq!(sequence, self.sequence);
+                refused
+            }
+            reply => panic!("{reply:?}"),
+        }
+    }
+
+    #[track_caller]
+    fn done(&mut self, request: Request<12>) {
+        assert_eq!(self.refused(request), None);
+    }
+
+    /// Led into a grasp.
+    fn grasping() -> Self {
+        let mut bench = Self::new();
+        bench.done(Request::Heartbeat);
+        bench.done(Request::Command(Command::Arm));
+        bench.done(GRASP);
+        bench
+    }
+}
+
+const GRASP: Request<12> = Request::Command(Command::Grasp(Grasp::CONFIGURED));
+const ARM: Request<12> = Request::Command(Command::Arm);
+
+#[test]
+fn a_session_begins_with_hello_and_everything_else_needs_one() {
+    let mut bench = Bench::silent(Clock::External);
+    assert_eq!(bench.refused(Request::Heartbeat), Some(Refusal::NoSession));
+    assert_eq!(bench.refused(ARM), Some(Refusal::NoSession));
+    let reply = bench.ask(Request::Hello { interface_version: INTERFACE_VERSION });
+    let sequence = bench.sequence;
+    assert_eq!(reply, Reply::Identity { sequence, session: 1, identity: identity(Clock::External) });
+    assert_eq!(bench.refused(Request::Heartbeat), Some(Refusal::NoSession), "still session 0");
+    bench.session = 1;
+    bench.done(Request::Heartbeat);
+    // Another hello ends this session.
+    bench.ask(Request::Hello { interface_version: INTERFACE_VERSION });
+    assert_eq!(bench.refused(Request::Heartbeat), Some(Refusal::NoSession));
+    bench.session = 2;
+    bench.done(Request::Heartbeat);
+}
+
+#[test]
+fn another_interface_version_is_told_who_is_there_and_nothing_else() {
+    let mut bench = Bench::silent(Clock::External);
+    let reply = bench.ask(Request::Hello { interface_version: INTERFACE_VERSION + 1 });
+    assert!(matches!(reply, Reply::Identity { session: 1, .. }));
+    bench.session = 1;
+    assert_eq!(bench.refused(Request::Heartbeat), Some(Refusal::OtherInterface));
+    assert_eq!(bench.refused(ARM), Some(Refusal::OtherInterface));
+    bench.done(Request::Command(Command::Stop));
+}
+
+#[test]
+fn replayed_and_late_requests_are_refused_by_name() {
+    let mut bench = Bench::new();
+    bench.done(Request::Heartbeat);
+    let arm = bench.packet(ARM);
+    let heartbeat = bench.packet(Request::Heartbeat);
+    let refusal = |outputs: Outputs<12>| match outputs.reply {
+        Some(Reply::Answer { refused, .. }) => refused,
+        reply => panic!("{reply:?}"),
+    };
+    assert_eq!(refusal(bench.tick(Some(heartbeat.clone()))), None);
+    assert_eq!(refusal(bench.tick(Some(arm.clone()))), Some(Refusal::OutOfOrder));
+    assert_eq!(refusal(bench.tick(Some(heartbeat))), Some(Refusal::OutOfOrder));
+    assert_eq!(bench.device.state().mode(), Mode::Disarmed);
+    // The numbers may wrap, and some may be missing.
+    for _ in 0..70 {
+        bench.sequence = bench.sequence.wrapping_add(1_000);
+        bench.done(Request::Heartbeat);
+    }
+    bench.done(ARM);
+    assert_eq!(refusal(bench.tick(Some(arm))), Some(Refusal::OutOfOrder));
+}
+
+#[test]
+fn stop_is_taken_from_whoever_it_comes() {
+    for session in [0, 1, 77] {
+        let mut bench = Bench::grasping();
+        let packet = Packet { session, sequence: 0, request: Request::Command(Command::Stop) };
+        let outputs = bench.tick(Some(packet));
+        assert_eq!(outputs.reply, Some(Reply::Answer { sequence: 0, refused: None }));
+        assert_eq!((outputs.record.mode, outputs.torques_nm), (Mode::Disarmed, [0.0; 12]));
+    }
+}
+
+#[test]
+fn arming_needs_a_heartbeat_and_the_crystal() {
+    let mut bench = Bench::new();
+    assert_eq!(bench.refused(ARM), Some(Refusal::NoHeartbeat));
+    bench.done(Request::Heartbeat);
+    bench.done(ARM);
+    for (clock, refused) in
+        [(Clock::Fallback, Some(Refusal::FallbackClock)), (Clock::Emulated, None), (Clock::External, None)]
+    {
+        let mut bench = Bench::silent(clock);
+        bench.ask(Request::Hello { interface_version: INTERFACE_VERSION });
+        bench.session = 1;
+        bench.done(Request::Heartbeat);
+        assert_eq!(bench.refused(ARM), refused);
+    }
+}
+
+#[test]
+fn a_heartbeat_keeps_the_grasp_and_nothing_else_does() {
+    let mut bench = Bench::grasping();
+    let about_telemetry = Request::GetParameter { parameter: Parameter::Force, index: 0 };
+    for tick in 0..1000 {
+        let request = if tick % 100 == 0 { Request::Heartbeat } else { about_telemetry.clone() };
+        bench.ask(request);
+        assert_eq!(bench.device.state().mode(), Mode::Grasping);
+    }
+    // The last heartbeat is 99 ticks ago.
+    bench.ask(about_telemetry.clone());
+    let packet = bench.packet(about_telemetry);
+    let record = bench.tick(Some(packet)).record;
+    assert_eq!(record.fault, Some(Raised::of_hand(Fault::LinkLost)));
+    assert_eq!(record.mode, Mode::Releasing);
+}
+
+#[test]
+fn commands_are_answered_by_the_tick() {
+    let mut bench = Bench::new();
+    assert_eq!(bench.refused(GRASP), Some(Refusal::NotArmed));
+    bench.done(Request::Heartbeat);
+    bench.done(ARM);
+    let firm = |force_n| Request::Command(Command::Grasp(Grasp { force_n, ..Grasp::CONFIGURED }));
+    assert_eq!(bench.refused(firm(Some(f32::NAN))), Some(Refusal::NotFinite));
+    assert_eq!(bench.refused(firm(Some(1e9))), Some(Refusal::OutOfRange));
+    bench.done(firm(Some(1.0)));
+    assert_eq!(bench.refused(Request::Command(Command::Arm)), Some(Refusal::Grasping));
+    bench.done(Request::Command(Command::Release));
+    assert_eq!(bench.refused(GRASP), Some(Refusal::Releasing));
+}
+
+#[test]
+fn every_parameter_can_be_read_and_set_back() {
+    let mut bench = Bench::new();
+    for &parameter in Parameter::ALL {
+        let count = match parameter.each() {
+            Each::Hand => 1,
+            Each::Joint => JOINTS as u8,
+            Each::Axis => 3,
+        };
+        for index in 0..count {
+            let Reply::Value { value, .. } = bench.ask(Request::GetParameter { parameter, index }) else {
+                panic!("{parameter}");
+            };
+            bench.done(Request::SetParameter { parameter, index, value });
+            let before = *bench.device.params().config();
+            // Something else that can be used: every parameter has room below.
+            let other = if parameter == Parameter::LateTicks { 2.0 } else { 0.75 * value };
+            let other = if value.fract() == 0.0 && value > 4.0 { other.round() } else { other };
+            match bench.refused(Request::SetParameter { parameter, index, value: other }) {
+                None if other != value => assert_ne!(*bench.device.params().config(), before, "{parameter}"),
+                None => {}
+                Some(refusal) => panic!("{parameter} = {other}: {refusal:?}"),
+            }
+            bench.done(Request::SetParameter { parameter, index, value });
+            assert_eq!(*bench.device.params().config(), before, "{parameter}");
+            for bad in [f32::NAN, f32::INFINITY] {
+                let refused = bench.refused(Request::SetParameter { parameter, index, value: bad });
+                assert_eq!(refused, Some(Refusal::NotFinite));
+            }
+            if parameter != Parameter::Gravity {
+                let refused = bench.refused(Request::SetParameter { parameter, index, value: -1.0 });
+                assert_eq!(refused, Some(Refusal::OutOfRange), "{parameter}");
+            }
+        }
+        let request = Request::GetParameter { parameter, index: count };
+        assert_eq!(bench.refused(request), Some(Refusal::NoSuchParameter));
+    }
+    assert_eq!(
+        bench.refused(Request::SetParameter { parameter: Parameter::ReleaseTime, index: 0, value: 0.5 }),
+        Some(Refusal::OutOfRange),
+        "not whole"
+    );
+}
+
+#[test]
+fn parameters_are_set_while_disarmed_and_a_limit_that_is_off_stays_off() {
+    let mut bench = Bench::grasping();
+    let set = Request::SetParameter { parameter: Parameter::Force, index: 0, value: 1.0 };
+    assert_eq!(bench.refused(set), Some(Refusal::NotDisarmed));
+    let mut config = config::<f32, 12>();
+    config.limits.slew_nm_s = None;
+    let mut bench = Bench { device: Device::new(params(&config), identity(Clock::External)), ..Bench::new() };
+    bench.ask(Request::Hello { interface_version: INTERFACE_VERSION });
+    let set = Request::SetParameter { parameter: Parameter::SlewLimit, index: 0, value: 1.0 };
+    assert_eq!(bench.refused(set), Some(Refusal::SwitchedOff));
+}
+
+#[test]
+fn records_come_as_asked_for() {
+    let mut bench = Bench::new();
+    assert!((0..10).all(|_| bench.tick(None).telemetry.is_none()));
+    let unknown: Signals = postcard_byte(0x80);
+    assert_eq!(
+        bench.refused(Request::Telemetry { decimation: 1, signals: unknown }),
+        Some(Refusal::OutOfRange)
+    );
+    for decimation in [1, 3, 10] {
+        bench.done(Request::Telemetry { decimation: 0, signals: Signals::NONE });
+        let first = bench.packet(Request::Telemetry { decimation, signals: Signals::COUNTS });
+        let mut sequences = Vec::new();
+        let mut packet = Some(first);
+        for tick in 0..60 {
+            let outputs = bench.tick(packet.take());
+            let due = tick % usize::from(decimation) == 0;
+            assert_eq!(outputs.telemetry, due.then_some(Signals::COUNTS), "{decimation} {tick}");
+            assert_eq!((outputs.record.cycles, outputs.record.dropped), (7, 3));
+            if due {
+                sequences.push(outputs.record.sequence);
+            }
+        }
+        assert!(sequences.windows(2).all(|pair| pair[1] == pair[0] + 1), "{sequences:?}");
+    }
+    let mut record = bench.tick(None).record;
+    record.keep(Signals::COUNTS);
+    assert_eq!((record.counts.as_slice().len(), record.torques_nm.as_slice().len()), (12, 0));
+    assert_eq!(record.limiting.as_slice().len(), 0);
+}
+
+/// A value that postcard writes as one byte.
+fn postcard_byte<T: serde::de::DeserializeOwned>(byte: u8) -> T {
+    postcard::from_bytes(&[byte]).expect("a byte")
+}
+
+#[test]
+fn joints_over_the_link_are_for_another_image_and_real_ones_may_fail() {
+    let mut bench = Bench::new();
+    let sample = Sample { counts: List::first_of([0; 12], 12), failed: None, late: false };
+    assert_eq!(bench.refused(Request::Joints(sample)), Some(Refusal::JointsAreReal));
+    let raised = Raised::at(4, Fault::CounterReset);
+    let inputs = Inputs { reading: Reading::Failed(raised), late: true, cycles: 0, dropped: 0, packet: None };
+    let record = bench.device.tick(&inputs).record;
+    assert_eq!((record.mode, record.fault, record.reading_failed), (Mode::Fault, Some(raised), Some(raised)));
+    assert!(record.events.contains(Event::Late));
+    bench.done(Request::Command(Command::ClearFault));
+}
+
+#[test]
+fn what_is_no_packet_is_answered() {
+    let packet = Packet12 { session: 9, sequence: 300, request: Request::Heartbeat };
+    let mut buffer = [0; Packet12::MOST_BYTES];
+    let bytes = postcard_bytes(&packet, &mut buffer);
+    let (tag, _) = bytes.split_last_mut().expect("not empty");
+    *tag = 99;
+    assert!(Packet12::decode(bytes).is_err());
+    let refused = Some(Refusal::NotUnderstood);
+    assert_eq!(not_understood::<12>(bytes), Reply::Answer { sequence: 300, refused });
+    assert_eq!(not_understood::<12>(&[]), Reply::Answer { sequence: 0, refused });
+}
+
+fn postcard_bytes<'a, T: serde::Serialize>(value: &T, buffer: &'a mut [u8]) -> &'a mut [u8] {
+    postcard::to_slice(value, buffer).expect("it fits")
+}
+
+#[test]
+fn the_longest_messages_fit() {
+    let mut buffer = [0; 1024];
+    let all = List::first_of([i32::MIN; 24], 24);
+    let sample = Sample { counts: all, failed: Some(Raised::at(255, Fault::OutputFailed)), late: true };
+    let packet = Packet::<24> { session: u16::MAX, sequence: u16::MAX, request: Request::Joints(sample) };
+    assert!(postcard_bytes(&packet, &mut buffer).len() <= Packet::<24>::MOST_BYTES);
+    let most = Grasp { force_n: Some(1.0), attitude_stiffness_nm: Some(1.0) };
+    let packet = Packet::<1> {
+        session: u16::MAX,
+        sequence: u16::MAX,
+        request: Request::Command(Command::Grasp(most)),
+    };
+    assert!(postcard_bytes(&packet, &mut buffer).len() <= Packet::<1>::MOST_BYTES);
+    let mut identity = identity(Clock::Fallback);
+    identity.image.hand = "a-hand-with-a-name-of-sixty-four-bytes-which-is-what-is-allowed!";
+    let reply: Reply<'_, 1> = Reply::Identity { sequence: u16::MAX, session: u16::MAX, identity };
+    let length = postcard_bytes(&reply, &mut buffer).len();
+    assert!(length <= Reply::<1>::MOST_BYTES, "{length} {}", Reply::<1>::MOST_BYTES);
+    assert!(1 + Record::<f32, 24>::MOST_BYTES <= Reply::<24>::MOST_BYTES);
+}
+
+/// Requests of every kind, most with values that can't be used.
+fn requests() -> impl Strategy<Value = Request<12>> {
+    let parameter = proptest::sample::select(Parameter::ALL);
+    let grasp = any::<(Option<f32>, Option<f32>)>().prop_map(|(force_n, attitude_stiffness_nm)| {
+        Command::Grasp(Grasp { force_n, attitude_stiffness_nm })
+    });
+    prop_oneof![
+        any::<u16>().prop_map(|interface_version| Request::Hello { interface_version }),
+        proptest::sample::select(&Command::ALL[..]).prop_map(Request::Command),
+        grasp.prop_map(Request::Command),
+        Just(Request::Heartbeat),
+        (parameter.clone(), any::<u8>(), any::<f32>())
+            .prop_map(|(parameter, index, value)| Request::SetParameter { parameter, index, value }),
+        (parameter, 0..14_u8, 0.0..100.0_f32).prop_map(|(parameter, index, value)| Request::SetParameter {
+            parameter,
+            index,
+            value
+        }),
+        any::<u16>().prop_map(|decimation| Request::Telemetry { decimation, signals: Signals::ALL }),
+    ]
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(100))]
+
+    /// Whatever is asked in whatever order and number: it is answered, torques are within their limits, and none without
+    /// a session, a heartbeat and an order.
+    #[test]
+    fn whatever_is_asked_is_answered(requests in proptest::collection::vec((requests(), 0..3_u16, 0..4_u16), 1..300)) {
+        let mut bench = Bench::new();
+        for (request, session, step) in requests {
+            bench.sequence = bench.sequence.wrapping_add(step);
+            let packet = Packet { session, sequence: bench.sequence, request };
+            // Through the wire and back.
+            let mut buffer = [0; most_bytes(Packet12::MOST_BYTES)];
+            let frame = link::encode(&packet, &mut buffer).unwrap();
+            let mut receiver = Receiver::<{ Packet12::MOST_BYTES + 4 }>::new();
+            let mut received = None;
+            for &byte in frame {
+                if let Some(payload) = receiver.push(byte) {
+                    received = Some(Packet12::decode(payload.unwrap()).unwrap());
+                }
+            }
+            let outputs = bench.tick(received);
+            prop_assert!(outputs.reply.is_some());
+            let torque_limits = bench.device.params().config().limits.torque_nm.unwrap();
+            for (torque, limit) in outputs.torques_nm.iter().zip(torque_limits) {
+                prop_assert!(torque.abs() <= limit);
+            }
+            if !matches!(outputs.record.mode, Mode::Armed | Mode::Grasping | Mode::Releasing) {
+                prop_assert_eq!(outputs.torques_nm, [0.0; 12]);
+            }
+        }
+    }
+}
