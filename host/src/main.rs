@@ -16,12 +16,14 @@ struct Cli {
 #[derive(Subcommand)]
 enum Command {
     Sim(commands::sim::Arguments),
+    Pil(commands::pil::Arguments),
     Flash(commands::flash::Arguments),
 }
 
 fn main() -> ExitCode {
     let outcome = match Cli::parse().command {
         Command::Sim(arguments) => commands::sim::run(&arguments),
+        Command::Pil(arguments) => commands::pil::run(&arguments),
         Command::Flash(arguments) => commands::flash::run(&arguments),
     };
     match outcome {

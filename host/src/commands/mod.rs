@@ -1,6 +1,7 @@
 //! What the command line can do, a file a command.
 
 pub(crate) mod flash;
+pub(crate) mod pil;
 pub(crate) mod sim;
 
 /// How a command ended that was not misused.
@@ -8,6 +9,6 @@ pub(crate) mod sim;
 pub(crate) enum Outcome {
     /// It showed what it should: exit code 0.
     Shown,
-    /// It ran, and failed to show it (the grasp was lost): exit code 1.
+    /// It ran, and failed to show it (the grasp was lost, bits differ): exit code 1.
     Failed,
 }

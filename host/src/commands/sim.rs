@@ -65,7 +65,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
 }
 
 /// A bar over simulated milliseconds; hidden where stderr is no terminal.
-fn progress_bar(duration_s: f64) -> ProgressBar {
+pub(super) fn progress_bar(duration_s: f64) -> ProgressBar {
     let style = "{bar:40} {percent:>3} %  {msg}simulated, {eta} left";
     ProgressBar::new((duration_s * 1e3) as u64)
         .with_style(ProgressStyle::with_template(style).unwrap_or_else(|_| ProgressStyle::default_bar()))
@@ -90,7 +90,7 @@ fn write_files(directory: &RunDir, scene: &Scene, run: &Run) -> anyhow::Result<(
 }
 
 /// The summary as a table.
-fn describe(summary: &Summary) -> String {
+pub(super) fn describe(summary: &Summary) -> String {
     let mut text = String::new();
     let mut line = |name: &str, value: String| {
         let _ = writeln!(text, "{name:<22}{value}");

@@ -1,5 +1,20 @@
 //! Firmware on a microcontroller, real or emulated.
+//!
+//! - [`image`]: what is in an image's file; [`build`]: where an image for processor in the loop comes from;
+//!   `flash` (feature `probe`): images onto a chip.
+//! - Processor in the loop, from the ground up: [`interrupt`], whether the user wants an end; [`transport`], bytes to and
+//!   from; `qemu`, the emulator as a process; [`client`], messages and answers; [`twin`], the firmware's double on the host;
+//!   [`compare`], whether they are one; [`pil`], a hand in a simulation whose controller is the firmware.
 
+pub mod build;
+pub mod client;
+pub mod compare;
 #[cfg(feature = "probe")]
 pub mod flash;
 pub mod image;
+pub mod interrupt;
+pub mod pil;
+#[cfg(unix)]
+pub mod qemu;
+pub mod transport;
+pub mod twin;

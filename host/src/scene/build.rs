@@ -14,9 +14,7 @@ use nalgebra::Vector3;
 const LONGEST_RUN_S: f64 = 3600.0;
 
 /// Checks a configuration and prepares the scene.
-pub(super) fn scene(mut file: SceneFile) -> Result<Scene> {
-    // Those of the scene are what acts.
-    file.hand.control = None;
+pub(super) fn scene(file: SceneFile) -> Result<Scene> {
     let mut warnings = Vec::new();
     for (key, word) in
         [("name", &file.name), ("hand.name", &file.hand.name), ("object.name", &file.object.name)]
@@ -79,6 +77,13 @@ fn settings(file: &SceneFile) -> Result<usize> {
                 format!("write it as format {SCHEMA}"),
             );
         }
+    }
+    // Those of the scene are what acts; those of the hand say which firmware is its own.
+    if let Some(gains) = &file.hand.control {
+        control(gains).map_err(|mut error| {
+            error.key = format!("hand.{}", error.key);
+            error
+        })?;
     }
     let control = &file.control;
     self::control(control)?;

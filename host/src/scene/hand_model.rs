@@ -1,5 +1,6 @@
 //! A hand without a scene: what its firmware is built with.
 
+use super::Scene;
 use super::{
     build::control,
     check::{Result, fail, name},
@@ -56,6 +57,20 @@ impl HandModel {
             let place = tree.place_of(&error.key).clone();
             error.at(&place)
         })
+    }
+
+    /// The hand of a scene, with the configuration of its own file.
+    ///
+    /// # Errors
+    /// As [`Self::load`].
+    pub fn of(scene: &Scene) -> std::result::Result<Self, SceneError> {
+        let place = Place::whole(&format!("scene {}, hand {}", scene.name, scene.file.hand.name));
+        Self::build(&scene.file.hand).map_err(|error| error.at(&place))
+    }
+
+    /// CRC-32 of all that a firmware takes from the hand: equal hands have equal firmware.
+    pub fn hash(&self) -> u32 {
+        crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC).checksum(self.source().as_bytes())
     }
 
     fn build(file: &HandFile) -> Result<Self> {

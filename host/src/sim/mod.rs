@@ -12,7 +12,9 @@
 //! Time 0 is the tick that is told to grasp. Before it the hand is armed while everything stands still, which starts the
 //! estimator. Everything is deterministic: the same scene and seed give the same bytes.
 
-mod controller;
+pub mod controller;
+mod encoders;
+pub mod injection;
 pub mod observe;
 pub mod summary;
 
@@ -21,9 +23,14 @@ use crate::plant::dynamics::JointVector;
 use crate::plant::{Lost, ModelError, Motion, ObjectModel, Plant, PlantModel};
 use crate::record::sample::Sample;
 use crate::scene::Scene;
+use blindgrasp_shared::command::{Command, Grasp};
 use blindgrasp_shared::control::GraspLaw;
+use blindgrasp_shared::fault::Raised;
 use blindgrasp_shared::parameter::ParameterError;
-use controller::Controller;
+use blindgrasp_shared::tick::Sensed;
+use controller::{Alone, Controller, Reach, Stepped, Turn};
+use encoders::Encoders;
+use injection::{Injection, Injections, Sensing};
 use nalgebra::Vector3;
 use observe::{Observer, Seen};
 use std::time::Instant;
@@ -45,30 +52,53 @@ pub enum SimulationError {
 pub struct Run {
     /// One sample a control tick.
     pub samples: Vec<Sample>,
+    /// The first fault of the controller, and the number of the tick that found it.
+    pub first_fault: Option<(u64, Raised)>,
     /// The verdict.
     pub summary: Summary,
 }
 
-/// A scene, ready to run.
-pub struct Simulation {
+/// A scene, ready to run with a controller.
+pub struct Simulation<C = Alone> {
     name: String,
-    joints: usize,
+    joint_names: Vec<String>,
     ticks: u64,
     period_us: u64,
     substeps: usize,
     torque_limits_nm: JointVector,
     delayed: bool,
-    controller: Controller,
+    /// The force `f_d` when all of it acts, N.
+    force_n: f32,
+    ideal: bool,
+    encoders: Encoders,
+    injections: Injections,
+    controller: C,
     plant: Plant,
     observer: Observer,
 }
 
 impl Simulation {
-    /// Prepares a scene.
+    /// Prepares a scene, with the tick alone for its controller.
     ///
     /// # Errors
     /// What is wrong with its model or its gains.
     pub fn new(scene: &Scene) -> Result<Self, SimulationError> {
+        Self::with_controller(scene, Alone::new(scene)?)
+    }
+
+    /// Runs to the end, or until the grasp is lost. `progress` is told the simulated time once in a while.
+    pub fn run(mut self, progress: impl FnMut(f64)) -> Run {
+        let Ok(run) = self.try_run(progress);
+        run
+    }
+}
+
+impl<C: Controller> Simulation<C> {
+    /// Prepares a scene. Its controller is disarmed.
+    ///
+    /// # Errors
+    /// What is wrong with the scene's model or its gains.
+    pub fn with_controller(scene: &Scene, controller: C) -> Result<Self, SimulationError> {
         let mut angles_rad = [0.0; MAX_JOINTS];
         angles_rad[..scene.start.angles_rad.len()].copy_from_slice(&scene.start.angles_rad);
         let start = Motion::at_rest(angles_rad, scene.start.position_m, scene.start.attitude);
@@ -77,26 +107,50 @@ impl Simulation {
         for (limit, joint) in torque_limits_nm.iter_mut().zip(&scene.joints) {
             *limit = joint.torque_limit_nm;
         }
-        let mut controller = Controller::new(scene)?;
-        controller.arm(&angles_rad);
         Ok(Self {
             name: scene.name.clone(),
-            joints: scene.hand.joint_count(),
+            joint_names: scene.joints.iter().map(|joint| joint.name.clone()).collect(),
             ticks: (scene.duration_s / scene.control.period_s).round() as u64,
             period_us: (scene.control.period_s * 1e6).round() as u64,
             substeps: scene.substeps,
             torque_limits_nm,
             delayed: scene.actuators.output_delay_ticks > 0,
+            force_n: scene.controller_config().law.force_n,
+            ideal: scene.sensors.ideal,
+            encoders: Encoders::new(scene),
+            injections: Injections::default(),
             observer: Observer::new(law(scene)?, plant.posture()),
             controller,
             plant,
         })
     }
 
-    /// Runs to the end, or until the grasp is lost. `progress` is told the simulated time once in a while.
-    pub fn run(mut self, mut progress: impl FnMut(f64)) -> Run {
+    /// Lets something go wrong.
+    ///
+    /// # Panics
+    /// If the hand has no such joint.
+    pub fn inject(&mut self, injection: Injection) {
+        let joints = self.joint_names.len();
+        assert!(injection.kind.joint().is_none_or(|joint| joint < joints), "the hand has {joints} joints");
+        self.injections.push(injection);
+    }
+
+    /// The controller.
+    pub fn controller(&self) -> &C {
+        &self.controller
+    }
+
+    /// Runs to the end, or until the grasp is lost, or until the controller can't go on. `progress` is told the
+    /// simulated time once in a while.
+    ///
+    /// # Errors
+    /// Why the controller can't go on.
+    pub fn try_run(&mut self, mut progress: impl FnMut(f64)) -> Result<Run, C::Error> {
+        // The hand is armed while everything stands still.
+        let mut stepped = self.control(None, Some(Command::Arm))?;
         let begun = Instant::now();
         let mut samples = Vec::with_capacity(self.ticks as usize + 1);
+        let mut first_fault = None;
         let mut applied = None;
         let mut lost = None;
         for tick in 0..=self.ticks {
@@ -104,16 +158,22 @@ impl Simulation {
             if tick % 100 == 0 {
                 progress(t_s);
             }
-            if let Err(reason) = self.period(t_s, &mut applied, &mut samples) {
+            // 1, 2: sense and control. The first tick is told to grasp.
+            let computed_before = stepped.torques_nm;
+            stepped = self.control(Some(tick), (tick == 0).then_some(Command::Grasp(Grasp::CONFIGURED)))?;
+            first_fault = first_fault.or(stepped.fault.map(|raised| (tick, raised)));
+            let wanted_nm = if self.delayed { computed_before } else { stepped.torques_nm };
+            if let Err(reason) = self.move_on(t_s, &wanted_nm, &stepped, &mut applied, &mut samples) {
                 lost = Some(reason);
                 break;
             }
         }
         let duration_s = lost.map_or(self.time_s(self.ticks), |(t_s, _)| t_s);
         let wall_s = begun.elapsed().as_secs_f64();
-        let fault = self.controller.fault();
-        let summary = Summary::of(Ending { scene: self.name, duration_s, lost, fault, wall_s }, &samples);
-        Run { samples, summary }
+        let fault = stepped.fault.map(|raised| self.in_words(raised));
+        let summary =
+            Summary::of(Ending { scene: self.name.clone(), duration_s, lost, fault, wall_s }, &samples);
+        Ok(Run { samples, first_fault, summary })
     }
 
     /// Time of a tick, s. From whole microseconds, so that it prints as what it is.
@@ -121,22 +181,45 @@ impl Simulation {
         (tick * self.period_us) as f64 / 1e6
     }
 
-    /// One control period that begins at `t_s`. `applied` are the torques on the joints, before (if there was a before) and
-    /// after.
-    fn period(
+    /// A fault, with the joint's name.
+    fn in_words(&self, raised: Raised) -> String {
+        let joint = raised.joint.and_then(|joint| self.joint_names.get(usize::from(joint)));
+        let joint = joint.map_or(String::new(), |name| format!("joint `{name}`: "));
+        format!("fault {}: {joint}{}", raised.fault.number(), raised.fault.words())
+    }
+
+    /// One tick of the controller, with the joints as they are now. `tick` is none before the grasp.
+    fn control(&mut self, tick: Option<u64>, command: Option<Command>) -> Result<Stepped, C::Error> {
+        let motion = self.plant.motion();
+        let (angles_rad, speeds_rad_s) =
+            (motion.angles_rad.map(|v| v as f32), motion.speeds_rad_s.map(|v| v as f32));
+        let counts = if self.ideal { [0; MAX_JOINTS] } else { self.encoders.read(&motion.angles_rad) };
+        let mut sensing = Sensing { counts, failed: None, late: false, reach: Reach::Everything };
+        if let Some(tick) = tick {
+            self.injections.apply(tick, &mut sensing);
+        }
+        let sensed = match sensing.failed {
+            Some(raised) => Sensed::Failed(raised),
+            None if self.ideal => Sensed::Ideal { angles_rad: &angles_rad, speeds_rad_s: &speeds_rad_s },
+            None => Sensed::Counts(&sensing.counts),
+        };
+        self.controller.step(&Turn { sensed, late: sensing.late, command, reach: sensing.reach })
+    }
+
+    /// What the torques do in one control period that begins at `t_s`. `applied` are the torques on the joints, before (if
+    /// there was a before) and after.
+    fn move_on(
         &mut self,
         t_s: f64,
+        wanted_nm: &[f32; MAX_JOINTS],
+        stepped: &Stepped,
         applied: &mut Option<JointVector>,
         samples: &mut Vec<Sample>,
     ) -> Result<(), (f64, Lost)> {
-        // 1, 2: sense and control.
-        let motion = self.plant.motion();
-        let computed_before = self.controller.torques_nm();
-        self.controller.tick(&motion.angles_rad, &motion.speeds_rad_s);
         // 3: actuate.
-        let wanted = if self.delayed { computed_before } else { self.controller.torques_nm() };
-        let now: JointVector =
-            std::array::from_fn(|k| wanted[k].clamp(-self.torque_limits_nm[k], self.torque_limits_nm[k]));
+        let now: JointVector = std::array::from_fn(|k| {
+            f64::from(wanted_nm[k]).clamp(-self.torque_limits_nm[k], self.torque_limits_nm[k])
+        });
         let before = applied.replace(now).unwrap_or(now);
         // 4: plant. The torques change at the very instant of the first sub-step, whose kick covers half a sub-step on
         // either side: it gets their mean, which keeps the integrator's second order.
@@ -146,7 +229,7 @@ impl Simulation {
             self.plant.solve(&torques).map_err(|lost| (at_s, lost))?;
             if substep == 0 {
                 // 5: record.
-                samples.push(self.sample(t_s, &now));
+                samples.push(self.sample(t_s, &now, stepped));
                 torques = now;
             }
             self.plant.advance();
@@ -154,14 +237,17 @@ impl Simulation {
         Ok(())
     }
 
-    fn sample(&self, t_s: f64, applied: &JointVector) -> Sample {
-        let (angles_rad, speeds_rad_s) = self.controller.estimate();
+    fn sample(&self, t_s: f64, applied: &JointVector, stepped: &Stepped) -> Sample {
+        let joints = self.joint_names.len();
+        let (angles_rad, speeds_rad_s) =
+            (stepped.angles_rad.map(f64::from), stepped.speeds_rad_s.map(f64::from));
+        let force_share = if self.force_n > 0.0 { f64::from(stepped.force_n / self.force_n) } else { 0.0 };
         let seen = Seen {
-            angles_rad: &angles_rad[..self.joints],
-            speeds_rad_s: &speeds_rad_s[..self.joints],
-            torques_nm: &applied[..self.joints],
-            force_share: self.controller.force_share(),
-            mode: self.controller.mode(),
+            angles_rad: &angles_rad[..joints],
+            speeds_rad_s: &speeds_rad_s[..joints],
+            torques_nm: &applied[..joints],
+            force_share,
+            mode: stepped.mode.words(),
         };
         self.observer.sample(t_s, &self.plant, &seen)
     }

@@ -1,0 +1,270 @@
+//! Bytes to a device and back.
+
+use super::interrupt;
+use std::io;
+use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
+
+/// Speed of the firmware's serial line, baud (`firmware/src/board.rs`).
+pub const BAUD: u32 = 1_000_000;
+/// How long nothing is looked at but the line.
+const SLICE: Duration = Duration::from_millis(100);
+
+/// Why bytes could not be sent or received.
+#[derive(Debug, thiserror::Error)]
+pub enum TransportError {
+    /// Nothing came in time.
+    #[error("nothing came in time")]
+    TimedOut,
+    /// The device hung up.
+    #[error("the device hung up")]
+    Closed,
+    /// The user wanted an end.
+    #[error("interrupted")]
+    Interrupted,
+    /// The operating system refused.
+    #[error(transparent)]
+    Io(#[from] io::Error),
+}
+
+/// A way to a device and back that keeps the order of the bytes.
+pub trait Transport {
+    /// Sends all the bytes.
+    ///
+    /// # Errors
+    /// If they are not all taken by `deadline`.
+    fn send(&mut self, bytes: &[u8], deadline: Instant) -> Result<(), TransportError>;
+
+    /// Waits for bytes; returns how many there are, at least one.
+    ///
+    /// # Errors
+    /// If there are none by `deadline`.
+    fn receive(&mut self, buffer: &mut [u8], deadline: Instant) -> Result<usize, TransportError>;
+
+    /// What is known of the other end that may explain a failure: a sentence or more.
+    fn trouble(&mut self) -> Option<String> {
+        None
+    }
+}
+
+impl<T: Transport + ?Sized> Transport for Box<T> {
+    fn send(&mut self, bytes: &[u8], deadline: Instant) -> Result<(), TransportError> {
+        (**self).send(bytes, deadline)
+    }
+
+    fn receive(&mut self, buffer: &mut [u8], deadline: Instant) -> Result<usize, TransportError> {
+        (**self).receive(buffer, deadline)
+    }
+
+    fn trouble(&mut self) -> Option<String> {
+        (**self).trouble()
+    }
+}
+
+/// What is left until the deadline, at most a slice of it.
+fn slice(deadline: Instant) -> Result<Duration, TransportError> {
+    if interrupt::wanted() {
+        return Err(TransportError::Interrupted);
+    }
+    match deadline.saturating_duration_since(Instant::now()) {
+        Duration::ZERO => Err(TransportError::TimedOut),
+        left => Ok(left.min(SLICE)),
+    }
+}
+
+/// Files that never block, one to read from and one to write to: pipes, or both ends of a socket.
+#[cfg(unix)]
+pub(super) struct Streams<R, W> {
+    pub(super) from: R,
+    pub(super) to: W,
+}
+
+#[cfg(unix)]
+impl<R: io::Read + std::os::fd::AsFd, W: io::Write + std::os::fd::AsFd> Transport for Streams<R, W> {
+    fn send(&mut self, mut bytes: &[u8], deadline: Instant) -> Result<(), TransportError> {
+        use nix::poll::PollFlags;
+        while !bytes.is_empty() {
+            match self.to.write(bytes) {
+                Ok(0) => return Err(TransportError::Closed),
+                Ok(sent) => bytes = &bytes[sent..],
+                Err(error) if error.kind() == io::ErrorKind::WouldBlock => {
+                    wait_for(&self.to, PollFlags::POLLOUT, deadline)?;
+                }
+                Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
+                Err(error) if has_hung_up(&error) => return Err(TransportError::Closed),
+                Err(error) => return Err(error.into()),
+            }
+        }
+        Ok(())
+    }
+
+    fn receive(&mut self, buffer: &mut [u8], deadline: Instant) -> Result<usize, TransportError> {
+        use nix::poll::PollFlags;
+        loop {
+            wait_for(&self.from, PollFlags::POLLIN, deadline)?;
+            match self.from.read(buffer) {
+                Ok(0) => return Err(TransportError::Closed),
+                Ok(count) => return Ok(count),
+                Err(error)
+                    if matches!(error.kind(), io::ErrorKind::WouldBlock | io::ErrorKind::Interrupted) => {}
+                Err(error) if has_hung_up(&error) => return Err(TransportError::Closed),
+                Err(error) => return Err(error.into()),
+            }
+        }
+    }
+}
+
+/// Whether the other end is gone.
+fn has_hung_up(error: &io::Error) -> bool {
+    use io::ErrorKind::{BrokenPipe, ConnectionReset, UnexpectedEof};
+    matches!(error.kind(), BrokenPipe | ConnectionReset | UnexpectedEof)
+}
+
+/// Waits until a file can be read or written, or its other end is gone.
+#[cfg(unix)]
+fn wait_for(
+    file: &impl std::os::fd::AsFd,
+    flags: nix::poll::PollFlags,
+    deadline: Instant,
+) -> Result<(), TransportError> {
+    use nix::errno::Errno;
+    use nix::poll::{PollFd, PollTimeout, poll};
+    loop {
+        // Up to the next whole millisecond, so that the last wait is not cut into many of none.
+        let left = slice(deadline)? + Duration::from_micros(999);
+        let timeout = PollTimeout::try_from(left).unwrap_or(PollTimeout::MAX);
+        match poll(&mut [PollFd::new(file.as_fd(), flags)], timeout) {
+            Ok(0) | Err(Errno::EINTR) => {}
+            Ok(_) => return Ok(()),
+            Err(error) => return Err(TransportError::Io(error.into())),
+        }
+    }
+}
+
+/// A serial port.
+pub struct SerialPort {
+    port: serial2::SerialPort,
+}
+
+/// Why a serial port could not be opened.
+#[derive(Debug, thiserror::Error)]
+#[error("cannot open the serial port {}: {source}; {}", .path.display(), ports(.known))]
+pub struct OpenError {
+    path: PathBuf,
+    source: io::Error,
+    known: Vec<PathBuf>,
+}
+
+fn ports(known: &[PathBuf]) -> String {
+    if known.is_empty() {
+        return "this machine has none".to_owned();
+    }
+    let names: Vec<String> = known.iter().map(|path| path.display().to_string()).collect();
+    format!("this machine has {}", names.join(", "))
+}
+
+impl SerialPort {
+    /// Opens a port: 8 bits, no parity, one stop bit.
+    ///
+    /// # Errors
+    /// Why not, and which ports there are.
+    pub fn open(path: &Path, baud: u32) -> Result<Self, OpenError> {
+        match serial2::SerialPort::open(path, baud) {
+            Ok(port) => Ok(Self { port }),
+            Err(source) => {
+                let mut known = serial2::SerialPort::available_ports().unwrap_or_default();
+                known.sort();
+                Err(OpenError { path: path.to_owned(), source, known })
+            }
+        }
+    }
+}
+
+impl Transport for SerialPort {
+    fn send(&mut self, mut bytes: &[u8], deadline: Instant) -> Result<(), TransportError> {
+        while !bytes.is_empty() {
+            self.port.set_write_timeout(slice(deadline)?)?;
+            match self.port.write(bytes) {
+                Ok(0) => return Err(TransportError::Closed),
+                Ok(sent) => bytes = &bytes[sent..],
+                Err(error) if is_timeout(&error) => {}
+                Err(error) if has_hung_up(&error) => return Err(TransportError::Closed),
+                Err(error) => return Err(error.into()),
+            }
+        }
+        Ok(())
+    }
+
+    fn receive(&mut self, buffer: &mut [u8], deadline: Instant) -> Result<usize, TransportError> {
+        loop {
+            self.port.set_read_timeout(slice(deadline)?)?;
+            match self.port.read(buffer) {
+                Ok(0) => return Err(TransportError::Closed),
+                Ok(count) => return Ok(count),
+                Err(error) if is_timeout(&error) => {}
+                Err(error) if has_hung_up(&error) => return Err(TransportError::Closed),
+                Err(error) => return Err(error.into()),
+            }
+        }
+    }
+}
+
+/// Whether the time was up, which is looked at elsewhere.
+fn is_timeout(error: &io::Error) -> bool {
+    use io::ErrorKind::{Interrupted, TimedOut, WouldBlock};
+    matches!(error.kind(), TimedOut | WouldBlock | Interrupted)
+}
+
+#[cfg(all(test, unix))]
+mod tests {
+    use super::*;
+    use std::os::unix::net::UnixStream;
+
+    fn pair() -> (Streams<UnixStream, UnixStream>, UnixStream) {
+        let (here, there) = UnixStream::pair().unwrap();
+        here.set_nonblocking(true).unwrap();
+        (Streams { from: here.try_clone().unwrap(), to: here }, there)
+    }
+
+    fn soon() -> Instant {
+        Instant::now() + Duration::from_millis(50)
+    }
+
+    #[test]
+    fn what_is_sent_arrives_in_both_directions() {
+        use std::io::{Read, Write};
+        let (mut here, mut there) = pair();
+        here.send(b"ping", soon()).unwrap();
+        let mut buffer = [0; 16];
+        assert_eq!(there.read(&mut buffer).unwrap(), 4);
+        there.write_all(b"pong!").unwrap();
+        assert_eq!(here.receive(&mut buffer, soon()).unwrap(), 5);
+        assert_eq!(&buffer[..5], b"pong!");
+    }
+
+    #[test]
+    fn silence_and_a_full_line_end_at_the_deadline() {
+        let (mut here, _there) = pair();
+        let begun = Instant::now();
+        assert!(matches!(here.receive(&mut [0; 4], soon()), Err(TransportError::TimedOut)));
+        let lots = vec![0; 1 << 24];
+        assert!(matches!(here.send(&lots, soon()), Err(TransportError::TimedOut)));
+        assert!(begun.elapsed() >= Duration::from_millis(100) && begun.elapsed() < Duration::from_secs(5));
+    }
+
+    #[test]
+    fn an_end_that_is_gone_is_noticed_at_once() {
+        let (mut here, there) = pair();
+        drop(there);
+        let deadline = Instant::now() + Duration::from_secs(60);
+        assert!(matches!(here.receive(&mut [0; 4], deadline), Err(TransportError::Closed)));
+        assert!(matches!(here.send(b"hello", deadline), Err(TransportError::Closed)));
+    }
+
+    #[test]
+    fn a_port_that_is_not_there_is_told_with_those_that_are() {
+        let error = SerialPort::open(Path::new("/dev/no-such-port"), 1_000_000).err().unwrap().to_string();
+        assert!(error.starts_with("cannot open the serial port /dev/no-such-port: "), "{error}");
+        assert!(error.contains("this machine has "), "{error}");
+    }
+}

@@ -1,0 +1,82 @@
+//! The firmware's double on the host: the same device with the same parameters, which is told the same.
+
+use super::client::{Answer, Firmware, Packet, Sample, Turned};
+use super::pil::{Peer, PilError};
+use crate::scene::HandModel;
+use crate::{MAX_FINGERS, MAX_JOINTS};
+use blindgrasp_shared::device::{Device, Inputs, Reading};
+use blindgrasp_shared::fault::{Fault, Raised};
+use blindgrasp_shared::identity::{Clock, Identity, Image, ResetCause, UNITS};
+use blindgrasp_shared::link::message::Reply;
+use blindgrasp_shared::parameter::ParameterError;
+use blindgrasp_shared::telemetry::INTERFACE_VERSION;
+use blindgrasp_shared::tick::{Params, State};
+
+/// A device on the host.
+#[derive(Clone, Debug)]
+pub struct Twin {
+    device: Device<MAX_JOINTS, MAX_FINGERS>,
+}
+
+impl Twin {
+    /// A device that has just started with the configuration of a hand, and a clock.
+    ///
+    /// # Errors
+    /// The first parameter that the controller refuses.
+    pub fn new(hand: &HandModel, clock: Clock) -> Result<Self, ParameterError> {
+        let params = Params::new(hand.hand.cast(), &hand.config)?;
+        // Its names are nobody's concern: who it is, the firmware says.
+        let image = Image {
+            interface_version: INTERFACE_VERSION,
+            kind: "pil",
+            hand: "twin",
+            hand_hash: hand.hash(),
+            firmware_version: env!("CARGO_PKG_VERSION"),
+            build_hash: 0,
+            joint_count: hand.hand.joint_count() as u8,
+            fingertip_count: hand.hand.fingertip_count() as u8,
+            period_us: hand.config.period_us,
+        };
+        let identity = Identity { image, units: UNITS, clock, reset: ResetCause::Unknown, crash: None };
+        Ok(Self { device: Device::new(params, identity) })
+    }
+
+    /// One tick.
+    pub fn tick(&mut self, packet: Option<&Packet>, sample: &Sample) -> Turned {
+        let joint_count = self.device.params().hand().joint_count();
+        let counts = sample.counts.as_slice();
+        let reading = match sample.failed {
+            Some(raised) => Reading::Failed(raised),
+            None if counts.len() != joint_count => {
+                Reading::Failed(Raised::at(counts.len(), Fault::SampleMissing))
+            }
+            None => Reading::Counts(std::array::from_fn(|k| counts.get(k).copied().unwrap_or(0))),
+        };
+        let inputs = Inputs { reading, late: sample.late, cycles: 0, dropped: 0, packet: packet.cloned() };
+        let outputs = self.device.tick(&inputs);
+        let answer = match outputs.reply {
+            None | Some(Reply::Record(_)) => None,
+            Some(Reply::Identity { session, identity, .. }) => {
+                Some(Answer::Identity { session, firmware: Firmware::from(&identity) })
+            }
+            Some(Reply::Answer { refused, .. }) => Some(refused.map_or(Answer::Done, Answer::Refused)),
+            Some(Reply::Value { value, .. }) => Some(Answer::Value(value)),
+        };
+        Turned { answer, record: outputs.record }
+    }
+
+    /// What its tick remembers.
+    pub fn state(&self) -> &State<f32, MAX_JOINTS, MAX_FINGERS> {
+        self.device.state()
+    }
+}
+
+impl Peer for Twin {
+    fn turn(&mut self, packet: Option<&Packet>, sample: &Sample) -> Result<Turned, PilError> {
+        Ok(self.tick(packet, sample))
+    }
+
+    fn motion_rad(&self) -> ([f32; MAX_JOINTS], [f32; MAX_JOINTS]) {
+        (*self.state().angles_rad(), *self.state().speeds_rad_s())
+    }
+}
