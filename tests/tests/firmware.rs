@@ -5,7 +5,7 @@
 
 use blindgrasp_tests::images::{image, root};
 use blindgrasp_tests::thumb::{Function, Image};
-use object::{Object, ObjectSection, ObjectSymbol, SectionKind};
+use object::{Object, ObjectSection, ObjectSymbol, SectionFlags, SectionKind, elf};
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::fs;
@@ -35,15 +35,14 @@ fn elf(kind: &'static str) -> &'static [u8] {
 fn sizes(elf: &[u8]) -> (u64, u64) {
     let file = object::File::parse(elf).expect("an ELF");
     let (mut flash, mut ram) = (0, 0);
-    for section in file.sections().filter(|section| section.size() > 0) {
-        match section.kind() {
-            SectionKind::Text | SectionKind::ReadOnlyData => flash += section.size(),
-            SectionKind::Data => {
-                flash += section.size();
-                ram += section.size();
-            }
-            SectionKind::UninitializedData => ram += section.size(),
-            _ => {}
+    for section in file.sections() {
+        let SectionFlags::Elf { sh_flags } = section.flags() else { continue };
+        let flags = |all: u32| sh_flags & u64::from(all) == u64::from(all);
+        // What is in memory at all; what comes from flash; what can be written.
+        if flags(elf::SHF_ALLOC) && section.size() > 0 {
+            let initialised = section.kind() != SectionKind::UninitializedData;
+            flash += if initialised { section.size() } else { 0 };
+            ram += if flags(elf::SHF_WRITE) { section.size() } else { 0 };
         }
     }
     (flash, ram)
