@@ -25,7 +25,7 @@ pub enum BuildError {
     )]
     OutsideRepository,
     /// The hand could not be written to a file for the build.
-    #[error("cannot write the scene's hand to {}: {source}", .path.display())]
+    #[error("cannot write the scene's hand to {}", .path.display())]
     Hand {
         /// The file.
         path: PathBuf,
@@ -33,8 +33,8 @@ pub enum BuildError {
         source: io::Error,
     },
     /// The build could not be started.
-    #[error("cannot run {TOOLCHAIN}: {0}")]
-    Start(io::Error),
+    #[error("cannot run {TOOLCHAIN}")]
+    Start(#[source] io::Error),
     /// It failed; the compiler has said why.
     #[error("the firmware can't be built ({0}): see above; or name an image with --image")]
     Failed(std::process::ExitStatus),

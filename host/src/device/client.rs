@@ -184,7 +184,7 @@ pub enum ClientError {
         traffic: Traffic,
     },
     /// The line failed.
-    #[error("the line to the firmware: {source}{}", because(.trouble))]
+    #[error("the line to the firmware failed{}", because(.trouble))]
     Line {
         /// How.
         source: TransportError,

@@ -45,7 +45,7 @@ pub enum QemuError {
     #[error("{} is not installed, or not in PATH: `apt-get install qemu-system-arm` on Debian, `brew install qemu` on macOS; or use a real board with --port", .0.display())]
     Missing(PathBuf),
     /// It could not be started.
-    #[error("cannot start {}: {source}", .program.display())]
+    #[error("cannot start {}", .program.display())]
     Start {
         /// The program.
         program: PathBuf,
@@ -60,13 +60,9 @@ pub enum QemuError {
         /// Why not.
         reason: String,
     },
-    /// Its folder, pipes or socket could not be made.
-    #[error("cannot make a folder with pipes for QEMU in {}: {source}", std::env::temp_dir().display())]
-    Folder {
-        /// Why.
-        #[from]
-        source: io::Error,
-    },
+    /// Its folder, pipes or socket could not be made or opened.
+    #[error("cannot make or open the pipes to QEMU in {}", std::env::temp_dir().display())]
+    Pipes(#[from] io::Error),
     /// It ended.
     #[error("{0}")]
     Ended(String),

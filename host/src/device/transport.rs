@@ -148,10 +148,10 @@ pub struct SerialPort {
 
 /// Why a serial port could not be opened.
 #[derive(Debug, thiserror::Error)]
-#[error("cannot open the serial port {}: {source}; {}", .path.display(), ports(.known))]
+#[error("cannot open the serial port {}: {reason}; {}", .path.display(), ports(.known))]
 pub struct OpenError {
     path: PathBuf,
-    source: io::Error,
+    reason: io::Error,
     known: Vec<PathBuf>,
 }
 
@@ -171,10 +171,10 @@ impl SerialPort {
     pub fn open(path: &Path, baud: u32) -> Result<Self, OpenError> {
         match serial2::SerialPort::open(path, baud) {
             Ok(port) => Ok(Self { port }),
-            Err(source) => {
+            Err(reason) => {
                 let mut known = serial2::SerialPort::available_ports().unwrap_or_default();
                 known.sort();
-                Err(OpenError { path: path.to_owned(), source, known })
+                Err(OpenError { path: path.to_owned(), reason, known })
             }
         }
     }

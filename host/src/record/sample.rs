@@ -3,7 +3,7 @@
 use nalgebra::{UnitQuaternion, Vector3};
 
 /// The state of everything at one control tick. Vectors are in the base frame of the hand.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Sample {
     /// Time since the start of the run, s.
     pub t_s: f64,
@@ -34,7 +34,7 @@ pub struct Sample {
 }
 
 /// One contact at one control tick.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ContactSample {
     /// Normal force `f_i`, N.
     pub normal_force_n: f64,
