@@ -327,6 +327,8 @@ pub struct Watched<T, const J: usize> {
     silent: u32,
     /// Late ticks, by weight.
     late: u32,
+    /// Late ticks since the start.
+    late_ticks: u32,
     /// Work of the last second, J.
     energy_j: T,
 }
@@ -370,8 +372,14 @@ impl<T: Real, const J: usize> Watched<T, J> {
             }; J],
             silent: u32::MAX,
             late: 0,
+            late_ticks: 0,
             energy_j: T::zero(),
         }
+    }
+
+    /// Ticks that were late since the start.
+    pub fn late_ticks(&self) -> u32 {
+        self.late_ticks
     }
 
     /// Work of the joints in the last second, J; what was done earlier fades.
@@ -428,6 +436,7 @@ impl<T: Real, const J: usize> Watch<T, J> {
 
     /// Counts late ticks; whether there were too many.
     pub fn lateness(&self, watched: &mut Watched<T, J>, late: bool) -> Option<Raised> {
+        watched.late_ticks = watched.late_ticks.saturating_add(u32::from(late));
         let most = self.late_most?;
         watched.late = if late {
             // Twice the limit is enough to be forgotten again in bounded time.

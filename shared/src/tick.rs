@@ -310,6 +310,7 @@ pub fn tick<T: Real, const J: usize, const F: usize>(
         attitude_potential_j: action.monitor.attitude_potential_j,
         energy_j: state.watched.energy_j(),
         cycles: 0,
+        late_ticks: state.watched.late_ticks(),
         dropped: 0,
         counts,
         torques_nm: List::first_of(action.torques_nm, joint_count),

@@ -437,6 +437,7 @@ fn late_ticks_are_a_fault_and_the_fall_back_clock_does_not_arm() {
     }
     let record = tick(&params, &mut state, &late).record;
     assert_eq!(record.fault, Some(Raised::of_hand(Fault::TickLate)));
+    assert_eq!(record.late_ticks, 4);
     let mut state = TestState::new();
     let events = Events::NONE.with(Event::FallbackClock, true);
     let arm = Input::counts(&counts, Some(Command::Arm)).with(events);

@@ -194,6 +194,7 @@ mod tests {
             attitude_potential_j: 0.0,
             energy_j: 0.0,
             cycles: 0,
+            late_ticks: 0,
             dropped: 0,
             counts: List::first_of([0; crate::MAX_JOINTS], 3),
             torques_nm: List::first_of(torques_nm, 3),

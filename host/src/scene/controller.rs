@@ -12,6 +12,8 @@ use blindgrasp_shared::tick::Config;
 use nalgebra::Vector3;
 use std::f64::consts::TAU;
 
+/// A joint's whole torque comes or goes in this time at the least, s.
+const SLEW_S: f64 = 0.01;
 /// How far before its end stop a joint is slowed, rad; less in a joint of small range.
 const STOP_MARGIN_RAD: f64 = 0.1;
 /// What a soft end stop pushes back with once its margin is used up, as a share of the joint's torque limit.
@@ -84,7 +86,13 @@ impl Setup<'_> {
                 force_n: limited.then_some((FIRMEST * control.force_n) as f32),
                 attitude_stiffness_nm: limited.then_some((FIRMEST * control.attitude_stiffness_nm) as f32),
                 torque_nm: limited.then(|| self.each(|joint| joint.torque_limit_nm)),
-                slew_nm_s: actuators.slew_limit_nm_s.map(|limit| self.each(|_| limit)),
+                slew_nm_s: match actuators.slew_limit_nm_s {
+                    Some(limit) => Some(self.each(|_| limit)),
+                    None if actuators.torque_limits => {
+                        Some(self.each(|joint| joint.torque_limit_nm / SLEW_S))
+                    }
+                    None => None,
+                },
                 stops,
             },
             faults: FaultConfig {

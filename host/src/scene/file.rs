@@ -206,7 +206,8 @@ pub struct Actuators {
     /// Whether the torque limits of the hand's joints apply.
     #[serde(default = "yes")]
     pub torque_limits: bool,
-    /// The fastest that a torque may change, N m/s; without it, at once.
+    /// The fastest that a torque may change, N m/s; without it, a joint's whole torque within 10 ms, if torque limits
+    /// apply.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub slew_limit_nm_s: Option<f64>,
 }

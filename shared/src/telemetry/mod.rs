@@ -56,6 +56,8 @@ pub struct Record<T, const J: usize> {
     pub energy_j: T,
     /// How long the tick before took with reading and writing the joints, processor cycles; 0 where there is no counter.
     pub cycles: u32,
+    /// Ticks that were late since the start.
+    pub late_ticks: u32,
     /// Records and answers that were lost since the start because a queue was full.
     pub dropped: u32,
     /// Encoder counts, one a joint; empty where angles came from elsewhere, or not at all.
@@ -96,7 +98,7 @@ impl<const J: usize> Record<f32, J> {
         let answer = option + Command::MOST_BYTES + option + 1;
         let (mode, events) = (1, 1);
         let list = 2;
-        4 * number + mode + 2 * fault + answer + events + 5 * float + 3 * list + J * (number + float + 1)
+        5 * number + mode + 2 * fault + answer + events + 5 * float + 3 * list + J * (number + float + 1)
     };
 
     /// Writes the record into a buffer and returns the part that was written.
@@ -153,6 +155,7 @@ mod tests {
             attitude_potential_j: 0.125,
             energy_j: 0.0625,
             cycles: 20_000,
+            late_ticks: 2,
             dropped: 1,
             counts: List::first_of(counts, 3),
             torques_nm: List::first_of(torques, 3),
@@ -182,6 +185,7 @@ mod tests {
             "0000003e",                   // attitude potential
             "0000803d",                   // energy
             "a09c01",                     // cycles
+            "02",                         // late ticks
             "01",                         // dropped
             "030001c0d102",               // counts
             "030000003f0000a0bf00000000", // torques
@@ -226,6 +230,7 @@ mod tests {
             sequence: u32::MAX,
             tick: u32::MAX,
             cycles: u32::MAX,
+            late_ticks: u32::MAX,
             dropped: u32::MAX,
             answer: Some(Answer {
                 command: Command::Grasp(Grasp { force_n: Some(0.0), attitude_stiffness_nm: Some(0.0) }),
@@ -277,7 +282,7 @@ mod tests {
             mode in proptest::sample::select(&Mode::ALL[..]),
             fault in proptest::option::of((proptest::sample::select(Fault::ALL), any::<Option<u8>>())),
             (late, heartbeat) in any::<(bool, bool)>(),
-            (cycles, dropped) in any::<(u32, u32)>(),
+            (cycles, late_ticks, dropped) in any::<(u32, u32, u32)>(),
             answer in answers(),
             floats in any::<[f32; 5]>(),
             count in 0..=12_usize,
@@ -304,6 +309,7 @@ mod tests {
                 attitude_potential_j: floats[3],
                 energy_j: floats[4],
                 cycles,
+                late_ticks,
                 dropped,
                 counts: List::first_of(counts, count),
                 torques_nm: List::first_of(torques, count),
