@@ -68,7 +68,6 @@ mod probe {
     use blindgrasp::device::flash::{Chip, Phase, Progress, download};
     use blindgrasp::device::image::{BUILD_HINT, ExpectedHand, Firmware, Footprint};
     use blindgrasp::scene::HandModel;
-    use crc::{CRC_32_ISO_HDLC, Crc};
     use indicatif::{ProgressBar, ProgressStyle};
     use probe_rs::probe::list::Lister;
     use serde::Serialize;
@@ -192,10 +191,7 @@ mod probe {
     fn expected_hand(path: &Path) -> anyhow::Result<ExpectedHand> {
         let text = path.to_str().context("the path after --hand is not UTF-8")?;
         let model = HandModel::load(text)?;
-        Ok(ExpectedHand {
-            hash: Crc::<u32>::new(&CRC_32_ISO_HDLC).checksum(&model.encode()),
-            name: model.name,
-        })
+        Ok(ExpectedHand { hash: model.hash(), name: model.name })
     }
 
     fn report<'a>(

@@ -55,10 +55,10 @@ pub(crate) struct Arguments {
     /// Print the summary as one JSON object
     #[arg(long)]
     json: bool,
-    /// Simulated time, s, in place of the scene's
+    /// Simulated time, s, in place of the number of ticks
     #[arg(long, value_name = "S", allow_negative_numbers = true, conflicts_with = "ticks")]
     duration: Option<f64>,
-    /// Number of ticks of the grasp, in place of the scene's time
+    /// Number of ticks of the grasp [default: 10000; with --uart 1000]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     ticks: Option<u32>,
     /// Change a value of the scene, such as control.force_n=4 (may be repeated)
@@ -68,6 +68,11 @@ pub(crate) struct Arguments {
     #[arg(long, conflicts_with_all = ["port", "uart", "duration", "ticks"])]
     bench: bool,
 }
+
+/// Ticks of a run, where nothing else is said: a few seconds.
+const TICKS: u32 = 10_000;
+/// The same through the emulated serial port, which takes a hundred times as long.
+const TICKS_BY_UART: u32 = 1_000;
 
 /// What `--json` prints.
 #[derive(Serialize)]
@@ -132,7 +137,8 @@ fn load(arguments: &Arguments) -> anyhow::Result<Scene> {
     let mut settings = arguments.settings.clone();
     settings.extend(arguments.duration.map(|s| format!("duration_s={s:?}")));
     let mut scene = Scene::load(name, &settings)?;
-    if let Some(ticks) = arguments.ticks {
+    if arguments.duration.is_none() {
+        let ticks = arguments.ticks.unwrap_or(if arguments.uart { TICKS_BY_UART } else { TICKS });
         // The first is at time 0.
         scene.duration_s = f64::from(ticks - 1) * scene.control.period_s;
     }
