@@ -128,7 +128,7 @@ not json
     #[test]
     fn a_hand_is_named_as_the_build_knows_it() {
         let root = tempfile::tempdir().unwrap();
-        let changed = ["hand.joint.0.torque_limit_nm=1.0".to_owned()];
+        let changed = ["hand.joint.1.torque_limit_nm=1.0".to_owned()];
         let scene = Scene::load("cube", &changed).unwrap();
         fs::create_dir_all(root.path().join("models/hands")).unwrap();
         for name in ["three-finger", "two-finger"] {

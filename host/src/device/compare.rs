@@ -239,7 +239,8 @@ mod tests {
         device.record.cycles = 12_000;
         device.record.dropped = 1;
         assert_eq!(compare(&device, &host).bits_differ, 0);
-        let changes: [(&str, fn(&mut Turned)); 10] = [
+        type Change = fn(&mut Turned);
+        let changes: [(&str, Change); 10] = [
             ("mode", |t| t.record.mode = Mode::Fault),
             ("fault", |t| t.record.fault = Some(Raised::of_hand(Fault::LinkLost))),
             ("answer to the command", |t| {

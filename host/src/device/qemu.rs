@@ -1,7 +1,8 @@
 //! QEMU as a process that runs an image: started, spoken to, and gone at the end, whatever the end is.
 //!
 //! It gets a process group of its own, which is killed when the value is dropped, and a folder of its own for pipes and
-//! sockets, which is removed then. If this process is killed itself, the firmware finds its pipe closed and ends QEMU.
+//! sockets, which is removed as soon as both ends are open. So if this process is killed itself, there is nothing left on
+//! the disk; and the firmware finds its pipe closed and ends QEMU.
 
 use super::image::Firmware;
 use super::interrupt;
@@ -215,7 +216,7 @@ impl Qemu {
         })?;
         let stdout = Tail::of(child.stdout.take());
         let stderr = Tail::of(child.stderr.take());
-        Ok(Process { child, stdout, stderr, _folder: folder })
+        Ok(Process { child, stdout, stderr, folder: Some(folder) })
     }
 }
 
@@ -238,7 +239,10 @@ impl Transport for Emulated {
     }
 
     fn receive(&mut self, buffer: &mut [u8], deadline: Instant) -> Result<usize, TransportError> {
-        self.streams.receive(buffer, deadline)
+        let count = self.streams.receive(buffer, deadline)?;
+        // Who answers has opened all that it was to open.
+        self.process.folder = None;
+        Ok(count)
     }
 
     fn trouble(&mut self) -> Option<String> {
@@ -254,12 +258,13 @@ impl Transport for Emulated {
     }
 }
 
-/// QEMU. The folder goes after the process has.
+/// QEMU.
 struct Process {
     child: Child,
     stdout: Tail,
     stderr: Tail,
-    _folder: TempDir,
+    /// Where its pipes or its socket are, until nobody needs their names any more.
+    folder: Option<TempDir>,
 }
 
 impl Process {

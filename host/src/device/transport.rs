@@ -221,9 +221,9 @@ mod tests {
     use std::os::unix::net::UnixStream;
 
     fn pair() -> (Streams<UnixStream, UnixStream>, UnixStream) {
-        let (here, there) = UnixStream::pair().unwrap();
-        here.set_nonblocking(true).unwrap();
-        (Streams { from: here.try_clone().unwrap(), to: here }, there)
+        let (here, there) = UnixStream::pair().expect("a pair");
+        here.set_nonblocking(true).expect("a socket");
+        (Streams { from: here.try_clone().expect("a socket"), to: here }, there)
     }
 
     fn soon() -> Instant {

@@ -216,7 +216,7 @@ fn figures_are_passed_on_if_they_are_whole() {
 #[test]
 fn what_is_no_image_for_this_is_refused() {
     let bench = Bench::new();
-    let refused = |path: &Path| Qemu::new(path, PATIENCE).err().expect("refused").to_string();
+    let refused = |path: &Path| Qemu::new(path, PATIENCE).expect_err("refused").to_string();
     assert_says(&refused(&bench.path("nothing")), &["nothing", "No such file"]);
     assert_says(&refused(&bench.image("hand")), &["image `hand`", "needs the image `pil`"]);
     fs::write(bench.path("text"), "text").expect("a file");
