@@ -24,9 +24,9 @@ pub fn image(kind: &str, hand: &str) -> PathBuf {
         .expect("tests/firmware-toolchain runs");
     assert!(output.status.success(), "the image `{kind}` for {hand} does not build");
     let messages = String::from_utf8(output.stdout).expect("cargo speaks UTF-8");
-    let executables = messages.lines().filter_map(|line| {
+    let mut executables = messages.lines().filter_map(|line| {
         let (_, rest) = line.split_once("\"executable\":\"")?;
         rest.split_once('"').map(|(path, _)| path)
     });
-    PathBuf::from(executables.last().expect("cargo names what it built"))
+    PathBuf::from(executables.next_back().expect("cargo names what it built"))
 }

@@ -6,7 +6,7 @@
 //! |---|---|
 //! | `fifo IN OUT` | two named pipes; the one to read is opened first. Ends QEMU when the host closes it |
 //! | `uart` | USART2, as on hardware |
-//! | `bench` | not at all: [`bench`](blindgrasp_firmware::bench) |
+//! | `bench` | not at all: the module `bench` of the library |
 //!
 //! On hardware it is always USART2: there is no one to ask.
 #![cfg_attr(target_os = "none", no_std, no_main)]

@@ -7,7 +7,7 @@
 //!
 //! The [`Pilot`] is the host's part of a session: it says hello, gives the firmware the parameters of the scene, keeps the
 //! heartbeat up, and passes commands on. To which [`Peer`] it speaks it does not know: [`Linked`] is a firmware and its twin;
-//! a [`Twin`](super::twin::Twin) alone is a simulation of the whole device, without a link.
+//! a [`Twin`] alone is a simulation of the whole device, without a link.
 //!
 //! Before it arms, the pilot lets the firmware do as many ticks as it has requests, with joints that stand still. From the
 //! first command on everything is as in a simulation without firmware, to the bit.

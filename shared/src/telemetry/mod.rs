@@ -213,8 +213,8 @@ mod tests {
         }
         assert_eq!(bytes(commands), "0001020000030405");
         let mut refusals = Vec::new();
-        for refusal in Refusal::ALL.iter().copied() {
-            refusals.push(postcard::to_slice(&refusal, &mut buffer).unwrap().to_vec());
+        for refusal in Refusal::ALL {
+            refusals.push(postcard::to_slice(refusal, &mut buffer).unwrap().to_vec());
         }
         assert_eq!(bytes(refusals), "000102030405060708090a0b0c0d0e0f10111213");
         let mut faults = Vec::new();
