@@ -251,8 +251,11 @@ fn readable(name: &str) -> String {
 mod tests {
     use super::*;
 
+    /// An instruction of one or two halfwords.
+    type Instruction = (u16, Option<u16>);
+
     /// Instructions as `llvm-mc -triple=thumbv7em -show-encoding` writes them.
-    fn function(instructions: &[(u16, Option<u16>)]) -> Function {
+    fn function(instructions: &[Instruction]) -> Function {
         let mut function = Function::default();
         let mut at = 0x0800_0100;
         for &(first, second) in instructions {
@@ -264,7 +267,7 @@ mod tests {
 
     #[test]
     fn stack_is_what_is_pushed() {
-        let cases: [(&str, &[(u16, Option<u16>)], u32); 9] = [
+        let cases: [(&str, &[Instruction], u32); 9] = [
             ("push {r4, r5, r7, lr}", &[(0xb5b0, None)], 16),
             ("sub sp, #24", &[(0xb086, None)], 24),
             ("push.w {r8, r9, r10, r11}", &[(0xe92d, Some(0x0f00))], 16),
