@@ -5,9 +5,13 @@
 use crate::joints::Joints;
 use crate::model::{FINGERS, JOINTS};
 use crate::queue::HandPacket;
+#[cfg(target_os = "none")]
+use crate::{queue::ControlEnd, schedule::Turn};
 use blindgrasp_shared::command::Command;
 use blindgrasp_shared::device::{Device, Inputs, Outputs, Reading};
 use blindgrasp_shared::fault::Raised;
+#[cfg(target_os = "none")]
+use blindgrasp_shared::link::message::Reply;
 use blindgrasp_shared::link::message::Request;
 
 /// What the turn before told about itself.
@@ -17,6 +21,27 @@ pub struct Timing {
     pub late: bool,
     /// Processor cycles that it took; zero where they can't be counted.
     pub cycles: u32,
+}
+
+/// What the control task does each time that it starts: a turn, and its answers to the queues.
+#[cfg(target_os = "none")]
+pub fn task(
+    control: &mut Control,
+    joints: &mut impl Joints<JOINTS>,
+    queues: &mut ControlEnd<'_>,
+    last: Timing,
+) -> Timing {
+    let turn = Turn::begin();
+    let packet = queues.take();
+    let mut outputs = control.turn(joints, packet, last, queues.dropped());
+    if let Some(reply) = outputs.reply {
+        queues.post(reply);
+    }
+    if let Some(signals) = outputs.telemetry {
+        outputs.record.keep(signals);
+        queues.post(Reply::Record(outputs.record));
+    }
+    turn.end()
 }
 
 /// The hand, and what one turn leaves for the next.

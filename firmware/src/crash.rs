@@ -6,6 +6,7 @@
 
 use blindgrasp_shared::identity::{Crash, CrashKind};
 use core::arch::naked_asm;
+#[cfg(not(feature = "no-panic"))]
 use core::panic::PanicInfo;
 use core::ptr::addr_of_mut;
 use cortex_m::peripheral::SCB;
@@ -60,6 +61,7 @@ fn checksum(words: &Words) -> u32 {
     digest.finalize()
 }
 
+#[cfg(not(feature = "no-panic"))]
 #[panic_handler]
 fn panic(info: &PanicInfo<'_>) -> ! {
     cortex_m::interrupt::disable();

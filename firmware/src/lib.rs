@@ -37,7 +37,7 @@ pub mod boot;
 pub mod clock;
 #[cfg(target_os = "none")]
 pub mod crash;
-#[cfg(target_os = "none")]
+#[cfg(all(target_os = "none", not(feature = "no-panic")))]
 pub mod report;
 #[cfg(target_os = "none")]
 pub mod schedule;
@@ -46,5 +46,5 @@ pub mod semihosting;
 #[cfg(target_os = "none")]
 pub mod serial;
 
-#[cfg(target_os = "none")]
+#[cfg(all(target_os = "none", not(feature = "no-panic")))]
 use defmt_rtt as _;

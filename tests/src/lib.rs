@@ -4,6 +4,7 @@
 //!   description.
 //! - [`random`]: seeded random numbers, rotations, inertias and hands.
 //! - [`hands`]: the paper's three-fingered hand, and the same hand on an arm.
+//! - [`images`]: the images for the microcontroller, built.
 //! - [`grasps`]: a hand, an object, a plant and the grasp law, ready to run.
 //! - [`numeric`]: derivatives by differences, and the largest of many errors.
 //! - [`polyhedra`]: random convex polyhedra, and scenes in which the hand grasps them.
@@ -12,6 +13,7 @@
 pub mod description;
 pub mod grasps;
 pub mod hands;
+pub mod images;
 pub mod numeric;
 pub mod polyhedra;
 pub mod random;

@@ -8,14 +8,13 @@
 mod app {
     use blindgrasp_firmware::board::{self, Buses, HandJoints};
     use blindgrasp_firmware::boot::Boot;
-    use blindgrasp_firmware::control::{Control, Timing};
+    use blindgrasp_firmware::control::{Control, Timing, task};
     use blindgrasp_firmware::link::Link;
     use blindgrasp_firmware::model::IMAGE_HAND;
     use blindgrasp_firmware::queue::{ControlEnd, Queues};
     use blindgrasp_firmware::report::{self, LineReport};
-    use blindgrasp_firmware::schedule::{self, Turn};
+    use blindgrasp_firmware::schedule;
     use blindgrasp_firmware::serial::{self, Bytes, Interrupt, Line};
-    use blindgrasp_shared::link::message::Reply;
     use stm32f4xx_hal::prelude::*;
     use stm32f4xx_hal::watchdog::IndependentWatchdog;
 
@@ -79,20 +78,10 @@ mod app {
     #[task(binds = SysTick, priority = 2, local = [control, joints, queues, last, watchdog])]
     fn control(cx: control::Context) {
         let control::LocalResources { control, joints, queues, last, watchdog, .. } = cx.local;
-        let turn = Turn::begin();
-        let packet = queues.take();
-        let mut outputs = control.turn(joints, packet, *last, queues.dropped());
-        if let Some(reply) = outputs.reply {
-            queues.post(reply);
-        }
-        if let Some(signals) = outputs.telemetry {
-            outputs.record.keep(signals);
-            queues.post(Reply::Record(outputs.record));
-        }
+        *last = task(control, joints, queues, *last);
         if let Some(watchdog) = watchdog {
             watchdog.feed();
         }
-        *last = turn.end();
     }
 
     /// A byte from the line: see [`serial`] for why this preempts the control task, and what it costs.
