@@ -1,0 +1,467 @@
+//! Everything that can go wrong, mid-grasp, in simulation: is it found, how soon, how soon is the torque gone, and does
+//! nothing jump? The tables of docs/safety.md are made here.
+//!
+//! **Nothing jumps** means, for a fault that takes the torque away ([`falls_off`]):
+//! - in the tick that finds it all torques are zero, and stay so; the joints feel it one tick later (the output delay);
+//! - before that, no torque changed by more from one tick to the next than in the same run without the fault (where the
+//!   fault is one of measuring);
+//! - from then on the mechanical energy of hand and object (kinetic, of the squeezed fingertips, of the links' weight)
+//!   only falls: whatever moves is moved by what was stored, and by the weight.
+//!
+//! For the loss of the link, which lets go ([`lets_go`]): force and stiffness fall in equal steps to zero over the release
+//! time; no torque changes by more in a tick than two such steps of the largest torque; no torque becomes larger than it
+//! was or than the links' weight asks for; then there is none.
+//!
+//! The simulated world ends when a fingertip leaves the object, a few milliseconds after the torque is gone. What a hand
+//! without an object does then is not simulated; its energy is what is measured here.
+
+use blindgrasp::MAX_JOINTS;
+use blindgrasp::scene::Scene;
+use blindgrasp::sim::injection::Kind;
+use blindgrasp_shared::fault::{Fault, Raised, Reaction};
+use blindgrasp_shared::limit::Limit;
+use blindgrasp_shared::supervisor::Mode;
+use blindgrasp_shared::tick::Config;
+use blindgrasp_tests::generated;
+use blindgrasp_tests::supervised::{
+    Course, HEARTBEAT_TICKS, Outcome, config, friction_energy_j, mechanical_energy_j, run, run_with, scene,
+};
+use std::ops::RangeInclusive;
+
+const DOCUMENT: &str = "docs/safety.md";
+/// Something goes wrong while the hand closes, and when everything is at rest.
+const INSTANTS: [u64; 2] = [150, 1000];
+const JOINTS: usize = 12;
+
+/// What came of one fault, over all joints and instants.
+struct Row {
+    fault: Fault,
+    what: &'static str,
+    scene: &'static str,
+    /// From the instant at which it is so, ticks.
+    found: RangeInclusive<u64>,
+    /// From the tick that found it until the joints have no torque, ticks.
+    off: RangeInclusive<u64>,
+    /// Fastest joint from then on, while the fingertips touch, rad/s.
+    fastest_rad_s: f64,
+}
+
+impl Row {
+    fn new(fault: Fault, what: &'static str, scene: &'static str) -> Self {
+        Self { fault, what, scene, found: 1..=0, off: 1..=0, fastest_rad_s: 0.0 }
+    }
+
+    fn add(&mut self, since: u64, at: u64, ending: &End) {
+        let widen = |range: &mut RangeInclusive<u64>, value: u64| {
+            *range = if range.is_empty() {
+                value..=value
+            } else {
+                value.min(*range.start())..=value.max(*range.end())
+            };
+        };
+        widen(&mut self.found, at - since);
+        widen(&mut self.off, ending.off);
+        self.fastest_rad_s = self.fastest_rad_s.max(ending.fastest_rad_s);
+    }
+}
+
+fn in_words(range: &RangeInclusive<u64>) -> String {
+    match (range.start(), range.end()) {
+        (least, most) if least == most => least.to_string(),
+        (least, most) => format!("{least} to {most}"),
+    }
+}
+
+/// How the torque went.
+struct End {
+    off: u64,
+    fastest_rad_s: f64,
+}
+
+fn largest(values: impl IntoIterator<Item = f64>) -> f64 {
+    values.into_iter().fold(0.0, f64::max)
+}
+
+/// Fastest joint of the plant in samples from one on, rad/s.
+fn fastest_rad_s(outcome: &Outcome, from: u64) -> f64 {
+    let samples = outcome.run.samples.iter().skip(from as usize);
+    largest(samples.flat_map(|sample| sample.speeds_rad_s.iter().map(|speed| speed.abs())))
+}
+
+/// Ticks from the one that found the fault until the joints have no torque.
+fn off(outcome: &Outcome, at: u64) -> u64 {
+    let without = |torques: &[f64]| torques.iter().all(|&torque| torque == 0.0);
+    let samples = &outcome.run.samples[at as usize..];
+    let off = samples.iter().position(|sample| without(&sample.torques_nm)).expect("the torque goes");
+    assert!(samples[off..].iter().all(|sample| without(&sample.torques_nm)), "the torque comes back");
+    off as u64
+}
+
+/// Mechanical energy only falls once the torque is gone. The first sub-step without torque still has half of it.
+fn energy_falls(scene: &Scene, outcome: &Outcome, from: u64) {
+    let energy_j = mechanical_energy_j(scene, outcome, from as usize + 1);
+    let first_j = energy_j.first().copied().unwrap_or(0.0);
+    for (tick, energy) in energy_j.iter().enumerate() {
+        let gained_j = energy - first_j;
+        assert!(gained_j <= friction_energy_j(scene) + 1e-9, "{gained_j} J more, {tick} ticks later");
+    }
+}
+
+/// A fault that takes the torque away. `healthy`: the same without the fault, where the fault is one of measuring.
+fn falls_off(scene: &Scene, healthy: Option<&Outcome>, outcome: &Outcome, at: u64) -> End {
+    let found = at as usize;
+    for (tick, turned) in outcome.turned.iter().enumerate().skip(found) {
+        assert_eq!(turned.mode, Mode::Fault, "tick {tick}");
+        assert!(
+            turned.torques_nm.iter().all(|&torque| torque == 0.0),
+            "tick {tick}: {:?}",
+            turned.torques_nm
+        );
+    }
+    if let Some(healthy) = healthy {
+        let step_nm = |outcome: &Outcome, until: usize, joint: usize| {
+            let pairs = outcome.turned[..until].windows(2);
+            largest(
+                pairs.map(|pair| f64::from((pair[1].torques_nm[joint] - pair[0].torques_nm[joint]).abs())),
+            )
+        };
+        for joint in 0..scene.joints.len() {
+            let (with, without) =
+                (step_nm(outcome, found, joint), step_nm(healthy, healthy.turned.len(), joint));
+            assert!(
+                with <= 1.0001 * without,
+                "joint {joint} jumps by {with} N m, without the fault {without}"
+            );
+        }
+    }
+    let off = off(outcome, at);
+    energy_falls(scene, outcome, at + off);
+    End { off, fastest_rad_s: fastest_rad_s(outcome, at + off) }
+}
+
+/// The loss of the link: lets go over `ticks`.
+fn lets_go(scene: &Scene, outcome: &Outcome, at: u64, ticks: usize) -> End {
+    let (found, over) = (at as usize, at as usize + ticks);
+    let turned = &outcome.turned;
+    let full = turned[found - 1];
+    for tick in found..over {
+        let (before, now) = (&turned[tick - 1], &turned[tick]);
+        assert_eq!(now.mode, Mode::Releasing, "tick {tick}");
+        let left = 1.0 - (tick - found + 1) as f32 / ticks as f32;
+        assert!((now.force_n - left * full.force_n).abs() < 1e-4 && now.force_n < before.force_n);
+        assert!(now.attitude_stiffness_nm < before.attitude_stiffness_nm);
+    }
+    assert_eq!(turned[over - 1].force_n, 0.0);
+    assert_eq!(turned[over - 1].attitude_stiffness_nm, 0.0);
+    let strongest_nm = largest(full.torques_nm.map(|torque| f64::from(torque.abs())));
+    for joint in 0..scene.joints.len() {
+        let magnitude = |tick: usize| turned[tick].torques_nm[joint].abs();
+        // What is left at the end holds the links' weight.
+        let most = magnitude(found - 1).max(magnitude(over - 1));
+        for tick in found..over {
+            let step_nm = turned[tick].torques_nm[joint] - turned[tick - 1].torques_nm[joint];
+            assert!(
+                f64::from(step_nm.abs()) <= 2.0 * strongest_nm / ticks as f64,
+                "joint {joint}: {step_nm} N m in tick {tick}"
+            );
+            assert!(magnitude(tick) <= most + 1e-3, "joint {joint}, tick {tick}: {} N m", magnitude(tick));
+        }
+    }
+    for turned in &turned[over..] {
+        assert_eq!(turned.mode, Mode::Fault);
+        assert!(turned.torques_nm.iter().all(|&torque| torque == 0.0));
+    }
+    let off = off(outcome, at);
+    energy_falls(scene, outcome, at + off);
+    End { off, fastest_rad_s: fastest_rad_s(outcome, at) }
+}
+
+/// A course in which a fault has to be found, of a joint if there is one.
+fn found(outcome: &Outcome, fault: Fault, joint: Option<usize>) -> u64 {
+    let (at, raised) = outcome.found().unwrap_or_else(|| panic!("{fault:?} of {joint:?} is not found"));
+    assert_eq!(raised.fault, fault, "{raised}, joint {joint:?}");
+    if let Some(joint) = joint {
+        assert_eq!(raised.joint.map(usize::from), Some(joint), "{raised}");
+    }
+    at
+}
+
+/// The same scene with nothing wrong, for a length of time.
+fn healthy(name: &str) -> (Scene, Outcome) {
+    let scene = scene(name, &["duration_s=1.5"]);
+    let outcome = run(&scene, &Course::default());
+    assert!(outcome.found().is_none() && outcome.run.summary.grasp_held);
+    (scene, outcome)
+}
+
+/// Each joint, in both scenes, at both instants.
+fn of_each_joint(fault: Fault, what: &'static str, kind: impl Fn(usize) -> Kind) -> Row {
+    let mut row = Row::new(fault, what, "cube, prism");
+    for name in ["cube", "prism"] {
+        let (scene, healthy) = healthy(name);
+        for at_tick in INSTANTS {
+            for joint in 0..JOINTS {
+                let outcome = run(&scene, &Course::fault(at_tick, kind(joint)));
+                let at = found(&outcome, fault, Some(joint));
+                row.add(at_tick, at, &falls_off(&scene, Some(&healthy), &outcome, at));
+            }
+        }
+    }
+    row
+}
+
+fn lost_counters() -> Row {
+    of_each_joint(Fault::SampleMissing, "a counter does not answer, each joint", |joint| {
+        Kind::ReadingLost(Raised::at(joint, Fault::SampleMissing))
+    })
+}
+
+fn reset_counters() -> Row {
+    of_each_joint(Fault::CounterReset, "a counter's settings read back wrong, each joint", |joint| {
+        Kind::ReadingLost(Raised::at(joint, Fault::CounterReset))
+    })
+}
+
+fn failed_outputs() -> Row {
+    of_each_joint(Fault::OutputFailed, "an output reads back wrong, each joint", |joint| {
+        Kind::ReadingLost(Raised::at(joint, Fault::OutputFailed))
+    })
+}
+
+/// A jump by a little more than the joint can turn: 185 rad/s and half as much again are 956 counts a tick.
+fn jumping_counters() -> Row {
+    of_each_joint(Fault::CountJump, "a counter jumps by 1000 counts (0.29 rad), each joint", |joint| {
+        Kind::CounterJump { joint, counts: if joint % 2 == 0 { 1000 } else { -1000 } }
+    })
+}
+
+fn late_ticks() -> Row {
+    let mut row = Row::new(Fault::TickLate, "every tick is late", "cube, prism");
+    for name in ["cube", "prism"] {
+        let (scene, healthy) = healthy(name);
+        for at_tick in INSTANTS {
+            let outcome = run(&scene, &Course::fault(at_tick, Kind::LateTicks));
+            let at = found(&outcome, Fault::TickLate, None);
+            row.add(at_tick, at, &falls_off(&scene, Some(&healthy), &outcome, at));
+        }
+    }
+    row
+}
+
+fn lost_links(kind: Kind, what: &'static str) -> Row {
+    let mut row = Row::new(Fault::LinkLost, what, "cube, prism");
+    for name in ["cube", "prism"] {
+        let (scene, _) = healthy(name);
+        let release_ticks = config(&scene).supervisor.release_ms as usize;
+        // Right after a heartbeat, and right before the next: the most and the least that it takes.
+        for at_tick in [1, HEARTBEAT_TICKS, 750 + 1, 750 + HEARTBEAT_TICKS] {
+            let outcome = run(&scene, &Course::fault(at_tick, kind));
+            let at = found(&outcome, Fault::LinkLost, None);
+            row.add(at_tick, at, &lets_go(&scene, &outcome, at, release_ticks));
+        }
+    }
+    row
+}
+
+/// The cube needs 0.57 N m of a joint and the prism 0.45, and they get less.
+fn saturated_torques() -> Row {
+    let mut row =
+        Row::new(Fault::SaturatedTooLong, "torque limits a little below what the force needs", "cube, prism");
+    for (name, limit) in [("cube", "0.56"), ("prism", "0.44")] {
+        let scene = scene(name, &["duration_s=2.0", &format!("hand.joint.*.torque_limit_nm={limit}")]);
+        let outcome = run(&scene, &Course::default());
+        let at = found(&outcome, Fault::SaturatedTooLong, None);
+        let joint =
+            outcome.found().and_then(|(_, raised)| raised.joint).map(usize::from).expect("of a joint");
+        let since = outcome.turned[..at as usize]
+            .iter()
+            .rposition(|turned| !turned.limiting[joint].contains(Limit::Torque))
+            .map_or(0, |tick| tick as u64 + 1);
+        row.add(since, at, &falls_off(&scene, None, &outcome, at));
+    }
+    row
+}
+
+/// Somebody bends a finger, with a torque at its knuckle.
+fn bent(joint: usize, torque_nm: f32) -> Course {
+    let mut push_nm = [0.0; MAX_JOINTS];
+    push_nm[joint] = torque_nm;
+    Course { pushes: vec![(1000..1500, push_nm)], ..Course::default() }
+}
+
+/// The first sample of which something is true, as a tick.
+fn since(outcome: &Outcome, is_so: impl FnMut(&blindgrasp::record::sample::Sample) -> bool) -> u64 {
+    outcome.run.samples.iter().position(is_so).expect("it comes to that") as u64
+}
+
+fn bent_fingers() -> Row {
+    let mut row = Row::new(Fault::BeyondRange, "somebody bends a finger back with 0.3 N m", "cube, prism");
+    for name in ["cube", "prism"] {
+        let (scene, _) = healthy(name);
+        // What a healthy, pushed hand does about frozen counters is looked at below.
+        let mut config = config(&scene);
+        config.faults.frozen = None;
+        let slack_rad = f64::from(config.faults.range_slack_rad.expect("it is watched"));
+        for joint in [1, 5, 9] {
+            let outcome = run_with(&scene, &config, &bent(joint, -0.3));
+            let at = found(&outcome, Fault::BeyondRange, Some(joint));
+            let (lower_rad, _) = scene.hand.range_rad(joint);
+            let since = since(&outcome, |sample| sample.angles_rad[joint] < lower_rad - slack_rad);
+            row.add(since, at, &pushed_off(&outcome, at));
+        }
+    }
+    row
+}
+
+/// As [`falls_off`], while somebody still pushes: there is torque on the joints, and energy comes in.
+fn pushed_off(outcome: &Outcome, at: u64) -> End {
+    for turned in &outcome.turned[at as usize..] {
+        assert_eq!(turned.mode, Mode::Fault);
+        assert!(turned.torques_nm.iter().all(|&torque| torque == 0.0));
+    }
+    // The output delay, as measured for the others.
+    End { off: 1, fastest_rad_s: fastest_rad_s(outcome, at + 1) }
+}
+
+fn changed(scene: &Scene, change: impl FnOnce(&mut Config<f32, MAX_JOINTS>)) -> Config<f32, MAX_JOINTS> {
+    let mut config = config(scene);
+    config.faults.frozen = None;
+    change(&mut config);
+    config
+}
+
+fn fast_joints() -> Row {
+    let mut row = Row::new(
+        Fault::Overspeed,
+        "somebody pushes a finger with 0.3 N m; limit 2 rad/s, as for a first start",
+        "cube, prism",
+    );
+    for name in ["cube", "prism"] {
+        let (scene, _) = healthy(name);
+        let config = changed(&scene, |config| config.faults.speed_limit_rad_s = Some([2.0; MAX_JOINTS]));
+        for joint in [1, 5, 9] {
+            let outcome = run_with(&scene, &config, &bent(joint, -0.3));
+            let at = found(&outcome, Fault::Overspeed, None);
+            let since = since(&outcome, |sample| sample.speeds_rad_s.iter().any(|speed| speed.abs() > 2.0));
+            row.add(since, at, &pushed_off(&outcome, at));
+        }
+    }
+    row
+}
+
+/// Closing takes up to 5 mJ: with a limit of 2 mJ that is too much. The work itself is added up from the plant.
+fn worked_too_much() -> Row {
+    let mut row = Row::new(Fault::TooMuchEnergy, "closing takes 5 mJ; limit 2 mJ", "cube, prism");
+    for name in ["cube", "prism"] {
+        let (scene, healthy) = healthy(name);
+        let limit_j = 2e-3;
+        let config = changed(&scene, |config| config.faults.energy_j = Some(limit_j as f32));
+        let outcome = run_with(&scene, &config, &Course::default());
+        let at = found(&outcome, Fault::TooMuchEnergy, None);
+        // In truth, of the torques that acted and the true speeds; of what was done a second ago, 1/e counts.
+        let mut work_j = vec![0.0];
+        for sample in &healthy.run.samples {
+            let power_w: f64 = sample.torques_nm.iter().zip(&sample.speeds_rad_s).map(|(a, b)| a * b).sum();
+            let last_j = work_j[work_j.len() - 1];
+            work_j.push(last_j + (power_w - last_j) * scene.control.period_s);
+        }
+        // Estimated speed and output are late, so that the tick's sum is off by a little.
+        assert!(work_j[at as usize] > 0.9 * limit_j, "{} J", work_j[at as usize]);
+        let since = work_j.iter().position(|&work_j| work_j > limit_j).expect("closing takes more") as u64;
+        let since = since.min(at);
+        row.add(since, at, &falls_off(&scene, Some(&healthy), &outcome, at));
+    }
+    row
+}
+
+/// A force that only a broken file can have, and nothing that limits it: the torque that the law asks for overflows at once.
+fn overflows() -> Row {
+    let mut row = Row::new(Fault::NotFinite, "a force of 3e38 N, without limits", "cube");
+    let (scene, _) = healthy("cube");
+    let config = changed(&scene, |config| {
+        config.law.force_n = 3e38;
+        config.limits.force_n = None;
+        config.supervisor.soft_start_ms = 0;
+    });
+    let outcome = run_with(&scene, &config, &Course::default());
+    let at = found(&outcome, Fault::NotFinite, None);
+    row.add(0, at, &falls_off(&scene, None, &outcome, at));
+    row
+}
+
+#[test]
+fn faults_are_found_and_the_torque_goes() {
+    let rows = [
+        lost_counters(),
+        overflows(),
+        jumping_counters(),
+        bent_fingers(),
+        fast_joints(),
+        saturated_torques(),
+        reset_counters(),
+        failed_outputs(),
+        lost_links(Kind::LinkCut, "the link is cut"),
+        lost_links(Kind::HeartbeatStops, "the heartbeat stops, commands still arrive"),
+        late_ticks(),
+        worked_too_much(),
+    ];
+    for row in &rows {
+        println!("{:?} found {:?} off {:?} fastest {}", row.fault, row.found, row.off, row.fastest_rad_s);
+    }
+    let lines: Vec<[String; 6]> = rows
+        .iter()
+        .map(|row| {
+            [
+                row.fault.number().to_string(),
+                row.what.to_owned(),
+                row.scene.to_owned(),
+                in_words(&row.found),
+                in_words(&row.off),
+                format!("{:.1}", row.fastest_rad_s),
+            ]
+        })
+        .collect();
+    let head = [
+        "fault",
+        "what happens",
+        "scene",
+        "found after, ticks",
+        "then without torque after, ticks",
+        "fastest joint from then on, rad/s",
+    ];
+    generated::check(DOCUMENT, "measured", &generated::table(head, &lines));
+
+    // What a tick's own reading shows is found in that tick; torque is gone at most 2 ticks later.
+    for row in &rows {
+        match row.fault.reaction() {
+            Reaction::TorqueOff => assert!(*row.off.end() <= 2, "{:?}", row.fault),
+            Reaction::Release => assert_eq!(row.off, 301..=301, "{:?}", row.fault),
+        }
+        if let Fault::SampleMissing
+        | Fault::CountJump
+        | Fault::CounterReset
+        | Fault::OutputFailed
+        | Fault::NotFinite = row.fault
+        {
+            assert_eq!(row.found, 0..=0, "{:?}", row.fault);
+        }
+    }
+}
+
+#[test]
+fn the_table_of_faults_is_that_of_the_code() {
+    let rows: Vec<[String; 5]> = Fault::ALL
+        .iter()
+        .map(|fault| {
+            let reaction = match fault.reaction() {
+                Reaction::TorqueOff => "torque off",
+                Reaction::Release => "lets go, then torque off",
+            };
+            let [number, words] = [fault.number().to_string(), format!("`{fault:?}`: {}", fault.words())];
+            let [reaction, found, remedy] = [reaction, fault.found(), fault.remedy()].map(str::to_owned);
+            [number, words, reaction, found, remedy]
+        })
+        .collect();
+    let head = ["number", "what is wrong", "what is done", "how it is found, and how soon", "what to do"];
+    generated::check(DOCUMENT, "faults", &generated::table(head, &rows));
+}
