@@ -18,14 +18,17 @@
 use blindgrasp::MAX_JOINTS;
 use blindgrasp::scene::Scene;
 use blindgrasp::sim::injection::Kind;
+use blindgrasp_shared::command::{Command, Grasp};
 use blindgrasp_shared::fault::{Fault, Raised, Reaction};
 use blindgrasp_shared::limit::Limit;
 use blindgrasp_shared::supervisor::Mode;
 use blindgrasp_shared::tick::Config;
 use blindgrasp_tests::generated;
 use blindgrasp_tests::supervised::{
-    Course, HEARTBEAT_TICKS, Outcome, config, friction_energy_j, mechanical_energy_j, run, run_with, scene,
+    Course, HEARTBEAT_TICKS, Outcome, config, friction_energy_j, mechanical_energy_j, push_nm, run, run_with,
+    scene,
 };
+use nalgebra::Vector3;
 use std::ops::RangeInclusive;
 
 const DOCUMENT: &str = "docs/safety.md";
@@ -464,4 +467,206 @@ fn the_table_of_faults_is_that_of_the_code() {
         .collect();
     let head = ["number", "what is wrong", "what is done", "how it is found, and how soon", "what to do"];
     generated::check(DOCUMENT, "faults", &generated::table(head, &rows));
+}
+
+/// How well each fingertip presses at the end, against the same grasp without a fault: largest relative difference.
+fn force_error(outcome: &Outcome, healthy: &Outcome) -> f64 {
+    let forces = |outcome: &Outcome| outcome.run.summary.last.normal_force_n.clone();
+    largest(forces(outcome).iter().zip(forces(healthy)).map(|(with, without)| (with / without - 1.0).abs()))
+}
+
+/// Counters that freeze where the joints hardly move, or not at all: in each scene, each joint.
+fn frozen_in_a_grasp() -> Vec<[String; 3]> {
+    let (mut closing, mut resting, mut releasing) = (0, 0, 0);
+    let (mut closing_error, mut resting_error): (f64, f64) = (0.0, 0.0);
+    for name in ["cube", "prism"] {
+        let (scene, healthy) = healthy(name);
+        for joint in 0..JOINTS {
+            let kind = Kind::CounterFrozen { joint };
+            // The first encoder counts come within the first hundred ticks.
+            let outcome = run(&scene, &Course::fault(50, kind));
+            assert!(outcome.run.summary.grasp_held, "joint {joint}");
+            closing += usize::from(outcome.found().is_some());
+            closing_error = closing_error.max(force_error(&outcome, &healthy));
+
+            let outcome = run(&scene, &Course::fault(1000, kind));
+            assert!(outcome.found().is_none(), "nothing moves: the count is right");
+            assert!(outcome.run.summary.grasp_held && outcome.run.summary.settled, "joint {joint}");
+            resting_error = resting_error.max(force_error(&outcome, &healthy));
+            resting += 1;
+
+            let mut course = Course::fault(1000, kind);
+            course.commands = vec![(1100, Command::Release)];
+            let outcome = run(&scene, &course);
+            releasing += usize::from(outcome.found().is_some());
+            let armed = outcome.turned.iter().position(|turned| turned.mode == Mode::Armed);
+            assert_eq!(armed, Some(1400), "the hand lets go all the same");
+            for pair in outcome.turned[1100..1400].windows(2) {
+                assert!(pair[1].force_n < pair[0].force_n);
+            }
+        }
+    }
+    assert!(closing_error < 0.05 && resting_error < 0.01, "{closing_error}, {resting_error}");
+    let row = |situation: &str, found: String, hand: String| [situation.to_owned(), found, hand];
+    vec![
+        row(
+            "freezes while the hand closes, each joint of cube and prism",
+            format!("{closing} of 24"),
+            format!("the grasp is held, forces off by {:.1} % at most", 100.0 * closing_error),
+        ),
+        row(
+            "freezes at rest",
+            format!("0 of {resting}: nothing moves, so that the count is right"),
+            format!("the grasp is held, forces off by {:.1} % at most", 100.0 * resting_error),
+        ),
+        row(
+            "freezes at rest, then `Release`",
+            format!("{releasing} of 24"),
+            "it lets go as without the fault".to_owned(),
+        ),
+    ]
+}
+
+/// Somebody pushes fingertips of a hand at rest, each along and against each axis, for a tenth of a second from tick 800.
+fn pushed(scene: &Scene, fingertips: usize, forces_n: &[f64]) -> Vec<Course> {
+    let mut courses = Vec::new();
+    for fingertip in 0..fingertips {
+        for axis in [Vector3::x(), Vector3::y(), Vector3::z()] {
+            for force_n in forces_n.iter().flat_map(|force| [*force, -force]) {
+                let push_nm = push_nm(scene, fingertip, axis * force_n);
+                courses.push(Course { pushes: vec![(800..900, push_nm)], ..Course::default() });
+            }
+        }
+    }
+    courses
+}
+
+/// What became of pushed hands.
+#[derive(Default)]
+struct Pushed {
+    /// Hands without a fault whose grasp survives the push when nobody watches, ...
+    healthy: usize,
+    /// ... and those of them in which a frozen counter is seen.
+    mistaken: usize,
+    /// Hands with a frozen counter.
+    frozen: usize,
+    /// Those in which the very counter is found, after how many ticks of pushing.
+    right: Vec<u64>,
+    /// Those in which another is.
+    wrong: usize,
+    /// Those with another fault.
+    other: usize,
+    /// Those with no fault that lose the grasp.
+    lost: usize,
+}
+
+fn push(name: &str) -> Pushed {
+    let scene = scene(name, &["duration_s=1.4"]);
+    let unwatched = changed(&scene, |_| {});
+    let survives = |course: &Course| {
+        let outcome = run_with(&scene, &unwatched, course);
+        outcome.run.summary.grasp_held && outcome.found().is_none()
+    };
+    let is_frozen = |raised: Raised| raised.fault == Fault::CounterFrozen;
+    let mut pushed_hands = Pushed::default();
+    for course in pushed(&scene, 3, &[0.5, 1.0]) {
+        if survives(&course) {
+            pushed_hands.healthy += 1;
+            let found = run(&scene, &course).found();
+            pushed_hands.mistaken += usize::from(found.is_some_and(|(_, raised)| is_frozen(raised)));
+        }
+    }
+    for mut course in pushed(&scene, 1, &[1.0]) {
+        if !survives(&course) {
+            continue;
+        }
+        for joint in 0..JOINTS {
+            course.injections = Course::fault(700, Kind::CounterFrozen { joint }).injections;
+            let outcome = run(&scene, &course);
+            pushed_hands.frozen += 1;
+            match outcome.found() {
+                Some((at, raised)) if raised == Raised::at(joint, Fault::CounterFrozen) => {
+                    pushed_off(&outcome, at);
+                    pushed_hands.right.push(at - 800);
+                }
+                Some((_, raised)) if is_frozen(raised) => pushed_hands.wrong += 1,
+                Some(_) => pushed_hands.other += 1,
+                None => pushed_hands.lost += usize::from(!outcome.run.summary.grasp_held),
+            }
+        }
+    }
+    pushed_hands
+}
+
+#[test]
+fn frozen_counters_are_found_where_it_matters_most() {
+    let mut rows = frozen_in_a_grasp();
+    let hands = std::thread::scope(|scope| {
+        let threads = ["cube", "prism"].map(|name| scope.spawn(move || push(name)));
+        threads.map(|thread| thread.join().expect("no panic"))
+    });
+    let sum = |count: fn(&Pushed) -> usize| hands.iter().map(count).sum::<usize>();
+    let mut after: Vec<u64> = hands.iter().flat_map(|hand| hand.right.iter().copied()).collect();
+    after.sort_unstable();
+    let (frozen, right) = (sum(|hand| hand.frozen), after.len());
+    rows.push([
+        "freezes at rest, then somebody pushes fingertip 1 with 1 N for 0.1 s, along and against each axis".to_owned(),
+        format!(
+            "{right} of {frozen} at the joint, {} to {} ticks after the push begins, half of them within {}; {} at another \
+             joint; {} end in another fault",
+            after[0],
+            after[right - 1],
+            after[right / 2],
+            sum(|hand| hand.wrong),
+            sum(|hand| hand.other),
+        ),
+        format!("of those not found, {} lose the grasp", sum(|hand| hand.lost)),
+    ]);
+    let (healthy, mistaken) = (sum(|hand| hand.healthy), sum(|hand| hand.mistaken));
+    rows.push([
+        "nothing freezes; somebody pushes any fingertip with 0.5 N or 1 N in the same way".to_owned(),
+        format!("**false alarm** in {mistaken} of {healthy}"),
+        "the torque goes, the object falls; without the watch the grasp would have survived".to_owned(),
+    ]);
+    generated::check(
+        DOCUMENT,
+        "frozen",
+        &generated::table(["situation", "found", "what the hand does"], &rows),
+    );
+    assert!(3 * right > frozen, "{right} of {frozen}");
+    assert!(50 * mistaken <= 2 * healthy, "{mistaken} false alarms in {healthy} pushed hands");
+}
+
+#[test]
+fn nothing_is_found_where_nothing_is_wrong() {
+    let conditions = [
+        "duration_s=2",
+        "friction.scale=0.2",
+        "friction.scale=3",
+        "control.force_n=2",
+        "control.force_n=10",
+        "sensors.noise_counts=1",
+        "control.attitude_stiffness_nm=0",
+    ];
+    let again = Course {
+        // The fingertips leave the object some ten ticks after the force is gone.
+        commands: vec![(1000, Command::Release), (1301, Command::Grasp(Grasp::CONFIGURED))],
+        ..Course::default()
+    };
+    for name in ["cube", "prism", "two-finger-prism"] {
+        for condition in conditions {
+            let scene = scene(name, &["duration_s=2", condition]);
+            let outcome = run(&scene, &Course::default());
+            assert_eq!(outcome.found(), None, "{name}, {condition}");
+            assert!(outcome.run.summary.grasp_held, "{name}, {condition}");
+        }
+        let scene = scene(name, &["duration_s=2"]);
+        let outcome = run(&scene, &again);
+        assert_eq!(outcome.found(), None, "{name}, a second grasp");
+        let last = outcome.turned.last().expect("it ran");
+        assert!(last.mode == Mode::Grasping && outcome.run.summary.grasp_held, "{name}: {:?}", last.mode);
+    }
+    let scene = scene("cube", &["duration_s=60"]);
+    let outcome = run(&scene, &Course::default());
+    assert!(outcome.found().is_none() && outcome.run.summary.settled, "a minute");
 }
