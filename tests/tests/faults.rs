@@ -36,6 +36,9 @@ const DOCUMENT: &str = "docs/safety.md";
 const INSTANTS: [u64; 2] = [150, 1000];
 const JOINTS: usize = 12;
 
+/// The range of no number: what is added to it is all there is.
+const NEVER: RangeInclusive<u64> = RangeInclusive::new(u64::MAX, 0);
+
 /// What came of one fault, over all joints and instants.
 struct Row {
     fault: Fault,
@@ -51,16 +54,12 @@ struct Row {
 
 impl Row {
     fn new(fault: Fault, what: &'static str, scene: &'static str) -> Self {
-        Self { fault, what, scene, found: 1..=0, off: 1..=0, fastest_rad_s: 0.0 }
+        Self { fault, what, scene, found: NEVER, off: NEVER, fastest_rad_s: 0.0 }
     }
 
     fn add(&mut self, since: u64, at: u64, ending: &End) {
         let widen = |range: &mut RangeInclusive<u64>, value: u64| {
-            *range = if range.is_empty() {
-                value..=value
-            } else {
-                value.min(*range.start())..=value.max(*range.end())
-            };
+            *range = value.min(*range.start())..=value.max(*range.end());
         };
         widen(&mut self.found, at - since);
         widen(&mut self.off, ending.off);
