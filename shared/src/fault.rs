@@ -192,8 +192,9 @@ pub struct FaultConfig<T, const J: usize> {
 }
 
 /// When a counter that stands still is not believed. A joint may stand still for hours; and in a grasp, a closed chain
-/// of rolling contacts, most of its torque limit may come and go without a count. What does not happen is that its
-/// neighbours turn far, and its torque changes, and it does not move at all.
+/// of rolling contacts, most of its torque limit may come and go without a count. What hardly ever happens is that its
+/// neighbours turn far, and its torque changes, and it does not move at all. Not never: the knee of a finger that is
+/// pushed to and fro stands still where its angle is at an extremum, and in a straight finger.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FrozenConfig<T, const J: usize> {
     /// Change of the torque since the last count that is too much for a joint that stands still, N m: well above its

@@ -3,18 +3,22 @@
 //! - [`description`]: a hand in the user's frames, with forward kinematics written a second time, straight from the
 //!   description.
 //! - [`random`]: seeded random numbers, rotations, inertias and hands.
+//! - [`generated`]: parts of documents that tests make.
 //! - [`hands`]: the paper's three-fingered hand, and the same hand on an arm.
 //! - [`images`]: the images for the microcontroller, built.
 //! - [`grasps`]: a hand, an object, a plant and the grasp law, ready to run.
 //! - [`numeric`]: derivatives by differences, and the largest of many errors.
 //! - [`polyhedra`]: random convex polyhedra, and scenes in which the hand grasps them.
+//! - [`supervised`]: a simulated hand whose controller is watched, with things that go wrong.
 //! - [`thumb`]: what the functions of an image for the microcontroller call, and how much stack they take.
 
 pub mod description;
+pub mod generated;
 pub mod grasps;
 pub mod hands;
 pub mod images;
 pub mod numeric;
 pub mod polyhedra;
 pub mod random;
+pub mod supervised;
 pub mod thumb;

@@ -1,0 +1,232 @@
+//! A simulated hand whose controller is watched: the tick with everything that a real hand's supervisor has, a host that
+//! commands it and gives signs of life, wrong wiring, and people who push.
+
+use blindgrasp::plant::{Motion, Plant};
+use blindgrasp::scene::{HandModel, Scene};
+use blindgrasp::sim::controller::{Controller, Reach, Stepped, Turn};
+use blindgrasp::sim::injection::{Injection, Kind};
+use blindgrasp::sim::{Run, Simulation, model};
+use blindgrasp::{MAX_FINGERS, MAX_JOINTS, Posture};
+use blindgrasp_shared::command::Command;
+use blindgrasp_shared::event::{Event, Events};
+use blindgrasp_shared::fault::Raised;
+use blindgrasp_shared::limit::Limiting;
+use blindgrasp_shared::supervisor::Mode;
+use blindgrasp_shared::tick::{Config, Input, Params, State, tick};
+use nalgebra::Vector3;
+use std::convert::Infallible;
+use std::ops::Range;
+
+/// Ticks from one heartbeat of the host to the next: a fifth of what is allowed.
+pub const HEARTBEAT_TICKS: u64 = 50;
+
+/// What happens in a run.
+#[derive(Clone, Debug, Default)]
+pub struct Course {
+    /// What goes wrong, and when.
+    pub injections: Vec<Injection>,
+    /// What the user asks for, and in which tick; the grasp of tick 0 needs no entry.
+    pub commands: Vec<(u64, Command)>,
+    /// Somebody leans on the fingers: torques on the joints besides those of the motors, N m, and during which ticks.
+    pub pushes: Vec<(Range<u64>, [f32; MAX_JOINTS])>,
+    /// Joints whose motor turns the wrong way, from a tick on.
+    pub reversed_motors: Vec<(u64, usize)>,
+}
+
+impl Course {
+    /// Nothing but one thing that goes wrong.
+    pub fn fault(at_tick: u64, kind: Kind) -> Self {
+        Self { injections: vec![Injection { at_tick, kind }], ..Self::default() }
+    }
+}
+
+/// One tick of the controller.
+#[derive(Clone, Copy, Debug)]
+pub struct Turned {
+    /// Torques that it asked for, N m.
+    pub torques_nm: [f32; MAX_JOINTS],
+    /// Joint speeds as it saw them, rad/s.
+    pub speeds_rad_s: [f32; MAX_JOINTS],
+    /// What limited each joint.
+    pub limiting: [Limiting; MAX_JOINTS],
+    /// The force `f_d` that acts, N.
+    pub force_n: f32,
+    /// The attitude stiffness `K_st` that acts, N m.
+    pub attitude_stiffness_nm: f32,
+    /// Work of the joints in the last second, J.
+    pub energy_j: f32,
+    /// The mode.
+    pub mode: Mode,
+    /// The fault that the hand is in.
+    pub fault: Option<Raised>,
+}
+
+/// The controller.
+struct Supervised {
+    params: Params<f32, MAX_JOINTS, MAX_FINGERS>,
+    state: State<f32, MAX_JOINTS, MAX_FINGERS>,
+    course: Course,
+    /// None before the grasp.
+    tick: Option<u64>,
+    turned: Vec<Turned>,
+}
+
+impl Controller for Supervised {
+    type Error = Infallible;
+
+    fn step(&mut self, turn: &Turn<'_>) -> Result<Stepped, Infallible> {
+        let (now, course) = (self.tick, &self.course);
+        let asked = course.commands.iter().find(|(at, _)| Some(*at) == now).map(|&(_, command)| command);
+        let heartbeat =
+            turn.reach == Reach::Everything && now.is_none_or(|tick| tick.is_multiple_of(HEARTBEAT_TICKS));
+        let input = Input {
+            sensed: turn.sensed,
+            events: Events::NONE.with(Event::Late, turn.late).with(Event::Heartbeat, heartbeat),
+            command: turn.command.or(asked).filter(|_| turn.reach != Reach::Nothing),
+        };
+        let output = tick(&self.params, &mut self.state, &input);
+        let record = &output.record;
+        let mut limiting = [Limiting::NONE; MAX_JOINTS];
+        for (limiting, reason) in limiting.iter_mut().zip(record.limiting.as_slice()) {
+            *limiting = *reason;
+        }
+        if now.is_some() {
+            self.turned.push(Turned {
+                torques_nm: output.torques_nm,
+                speeds_rad_s: *self.state.speeds_rad_s(),
+                limiting,
+                force_n: record.force_n,
+                attitude_stiffness_nm: record.attitude_stiffness_nm,
+                energy_j: record.energy_j,
+                mode: record.mode,
+                fault: record.fault,
+            });
+        }
+        let mut torques_nm = output.torques_nm;
+        if let Some(now) = now {
+            for &(_, joint) in course.reversed_motors.iter().filter(|(from, _)| *from <= now) {
+                torques_nm[joint] = -torques_nm[joint];
+            }
+            for (_, push_nm) in course.pushes.iter().filter(|(ticks, _)| ticks.contains(&now)) {
+                for (torque, push) in torques_nm.iter_mut().zip(push_nm) {
+                    *torque += push;
+                }
+            }
+        }
+        self.tick = Some(now.map_or(0, |tick| tick + 1));
+        Ok(Stepped {
+            torques_nm,
+            angles_rad: *self.state.angles_rad(),
+            speeds_rad_s: *self.state.speeds_rad_s(),
+            force_n: record.force_n,
+            mode: record.mode,
+            fault: record.fault,
+        })
+    }
+}
+
+/// What came of a course.
+#[derive(Clone, Debug)]
+pub struct Outcome {
+    /// The run, as the plant had it.
+    pub run: Run,
+    /// What the controller did, a tick each.
+    pub turned: Vec<Turned>,
+}
+
+impl Outcome {
+    /// The first fault and its tick.
+    pub fn found(&self) -> Option<(u64, Raised)> {
+        self.run.first_fault
+    }
+}
+
+/// The configuration of a scene's controller with the two watches that only a hand with a host has: heartbeat and
+/// deadline, as its firmware has them.
+///
+/// # Panics
+/// If the scene's hand has no firmware.
+pub fn config(scene: &Scene) -> Config<f32, MAX_JOINTS> {
+    let firmware = HandModel::of(scene).unwrap_or_else(|error| panic!("{error}")).config;
+    let mut config = scene.controller_config();
+    config.faults.heartbeat_ms = firmware.faults.heartbeat_ms;
+    config.faults.late_ticks = firmware.faults.late_ticks;
+    config
+}
+
+/// A built-in scene with settings `KEY=VALUE`.
+///
+/// # Panics
+/// If there is something wrong with them.
+pub fn scene(name: &str, settings: &[&str]) -> Scene {
+    let settings: Vec<String> = settings.iter().map(|&setting| setting.to_owned()).collect();
+    Scene::load(name, &settings).unwrap_or_else(|error| panic!("{error}"))
+}
+
+/// Runs a course.
+///
+/// # Panics
+/// If the scene can't be simulated.
+pub fn run(scene: &Scene, course: &Course) -> Outcome {
+    run_with(scene, &config(scene), course)
+}
+
+/// Runs a course with a configuration of one's own.
+///
+/// # Panics
+/// If the scene can't be simulated.
+pub fn run_with(scene: &Scene, config: &Config<f32, MAX_JOINTS>, course: &Course) -> Outcome {
+    let params = Params::new(scene.hand.cast(), config).unwrap_or_else(|error| panic!("{error}"));
+    let controller =
+        Supervised { params, state: State::new(), course: course.clone(), tick: None, turned: Vec::new() };
+    let mut simulation =
+        Simulation::with_controller(scene, controller).unwrap_or_else(|error| panic!("{error}"));
+    for injection in &course.injections {
+        simulation.inject(*injection);
+    }
+    let Ok(run) = simulation.try_run(|_| {});
+    Outcome { run, turned: simulation.controller().turned.clone() }
+}
+
+/// Joint torques, N m, of a force on the centre of a fingertip, N, in the base frame, with the hand as the scene starts it.
+pub fn push_nm(scene: &Scene, fingertip: usize, force_n: Vector3<f64>) -> [f32; MAX_JOINTS] {
+    let mut angles_rad = [0.0; MAX_JOINTS];
+    angles_rad[..scene.start.angles_rad.len()].copy_from_slice(&scene.start.angles_rad);
+    let mut posture = Posture::at_base();
+    scene.hand.forward_kinematics(&angles_rad, &mut posture);
+    let torques_nm = scene.hand.jacobians(&posture, fingertip).0.tr_mul(&force_n);
+    std::array::from_fn(|k| torques_nm[k] as f32)
+}
+
+/// Mechanical energy of hand and object at each sample from one on, J: kinetic, of the squeezed fingertips, and of the
+/// links' weight. Without torque it can only fall, but for what the friction of the joints has stored.
+///
+/// # Panics
+/// If the scene has no equations of motion.
+pub fn mechanical_energy_j(scene: &Scene, outcome: &Outcome, from: usize) -> Vec<f64> {
+    let gravity = Vector3::from(scene.plant.gravity_m_s2);
+    let energy = |sample: &blindgrasp::record::sample::Sample| {
+        let padded = |values: &[f64]| std::array::from_fn(|k| values.get(k).copied().unwrap_or(0.0));
+        let motion = Motion {
+            angles_rad: padded(&sample.angles_rad),
+            position_m: sample.position_m,
+            attitude: sample.attitude,
+            speeds_rad_s: padded(&sample.speeds_rad_s),
+            velocity_m_s: sample.velocity_m_s,
+            spin_rad_s: sample.spin_rad_s,
+        };
+        let plant = Plant::new(model(scene), motion, scene.plant.substep_s).expect("it ran");
+        let mut weight_j = 0.0;
+        for k in 0..scene.hand.joint_count() {
+            let link = scene.hand.link(k);
+            weight_j -= link.mass_kg * gravity.dot(&plant.posture().link(k).point(&link.mass_centre_m));
+        }
+        plant.kinetic_energy_j() + plant.elastic_energy_j() + weight_j
+    };
+    outcome.run.samples[from.min(outcome.run.samples.len())..].iter().map(energy).collect()
+}
+
+/// Torque that the joints' friction can give back once, J: what its springs store.
+pub fn friction_energy_j(scene: &Scene) -> f64 {
+    scene.joints.iter().map(|joint| 0.5 * joint.friction.coulomb_nm * joint.friction.presliding_rad).sum()
+}
