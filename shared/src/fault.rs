@@ -108,8 +108,8 @@ faults! {
         "a late tick counts 10, each one in time takes 1 off again: above 10 times `faults.late_ticks`",
         "report the record; choose a longer period";
     TooMuchEnergy    = 12, TorqueOff, "joints put more energy into the world than they may",
-        "as soon as the work of the last second (fading) is above `faults.energy_j`",
-        "check the signs of encoders and motors; look for what drives the hand";
+        "as soon as the work of the last second (fading) is above `faults.energy_j`; the work is reckoned from torques and estimated speeds, so a motor with the wrong sign looks like a brake",
+        "look for what lets the joints run on: a lost object, an encoder of the wrong scale; lower the force";
 }
 
 impl From<Fault> for u8 {
