@@ -147,8 +147,8 @@ fn what_is_switched_off_on_one_side_only_is_named() {
         &["`gravity_m_s2` is switched off in the scene and on"],
     );
     assert_says(
-        &error("actuators.slew_limit_nm_s=100.0"),
-        &["`limits.slew_nm_s` is switched on in the scene and off"],
+        &error("actuators.torque_limits=false"),
+        &["`limits.force_n` is switched off in the scene and on"],
     );
 }
 
