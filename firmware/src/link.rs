@@ -1,5 +1,6 @@
 //! Between the line and the control task: frames to packets, replies to frames. Runs when nothing else does.
 
+use crate::model::JOINTS;
 use crate::queue::{HandPacket, HandReply, LinkEnd};
 use blindgrasp_shared::command::Refusal;
 use blindgrasp_shared::link::message::{Packet, Reply, not_understood};
@@ -21,12 +22,15 @@ pub trait Port {
     fn try_send(&mut self, byte: u8) -> bool;
 }
 
+/// Refusals that can wait to be sent: more than there are frames in the bytes that can wait to be looked at.
+const REFUSALS: usize = 64;
+
 /// What a frame with a good CRC held.
 pub enum Received {
     /// A request.
     Packet(HandPacket),
-    /// Something else; this is to be answered.
-    Unknown(HandReply),
+    /// Something else; what stands where a request has its number.
+    Unknown(u16),
 }
 
 /// Finds frames in whatever the port brings.
@@ -41,10 +45,12 @@ impl Frames {
     /// Takes a byte; returns what the frame held that it completes. Bad frames are counted.
     pub fn push(&mut self, byte: u8) -> Option<Received> {
         let payload = self.0.push(byte)?.ok()?;
-        Some(
-            Packet::decode(payload)
-                .map_or_else(|_| Received::Unknown(not_understood(payload)), Received::Packet),
-        )
+        match (Packet::decode(payload), not_understood::<JOINTS>(payload)) {
+            (Ok(packet), _) => Some(Received::Packet(packet)),
+            (Err(_), Reply::Answer { sequence, .. }) => Some(Received::Unknown(sequence)),
+            // It is an answer.
+            (Err(_), _) => None,
+        }
     }
 
     /// Frames good and bad.
@@ -64,8 +70,8 @@ pub struct Link<'q, P> {
     port: P,
     frames: Frames,
     queues: LinkEnd<'q>,
-    /// Answers to requests that do not get to the control task.
-    answers: Deque<HandReply, 4>,
+    /// Requests that do not get to the control task: their numbers, and why not.
+    refusals: Deque<(u16, Refusal), REFUSALS>,
     /// The frame that is being sent, what of it is sent, and its length.
     frame: [u8; MOST_SENT],
     sent: usize,
@@ -79,7 +85,7 @@ impl<'q, P: Port> Link<'q, P> {
             port,
             frames: Frames::new(),
             queues,
-            answers: Deque::new(),
+            refusals: Deque::new(),
             frame: [0; MOST_SENT],
             sent: 0,
             length: 0,
@@ -87,21 +93,29 @@ impl<'q, P: Port> Link<'q, P> {
     }
 
     /// Does a small piece of what there is to do: all bytes that came, and a byte to send.
+    ///
+    /// While there is no room for another refusal, bytes wait where they are: every request is answered.
     pub fn poll(&mut self) {
-        while let Some(byte) = self.port.receive() {
-            let answer = match self.frames.push(byte) {
+        while !self.refusals.is_full()
+            && let Some(byte) = self.port.receive()
+        {
+            let refusal = match self.frames.push(byte) {
                 None => continue,
                 Some(Received::Packet(packet)) => match self.queues.put(packet) {
                     Ok(()) => continue,
-                    Err(packet) => busy(packet.sequence),
+                    Err(packet) => (packet.sequence, Refusal::Busy),
                 },
-                Some(Received::Unknown(answer)) => answer,
+                Some(Received::Unknown(sequence)) => (sequence, Refusal::NotUnderstood),
             };
-            // With too many of these too, a request stays unanswered: the host sees that by the sequence numbers.
-            let _ = self.answers.push_back(answer);
+            // There is room, so this can't fail.
+            let _ = self.refusals.push_back(refusal);
         }
         if self.sent == self.length
-            && let Some(reply) = self.answers.pop_front().or_else(|| self.queues.take())
+            && let Some(reply) = self
+                .refusals
+                .pop_front()
+                .map(|(sequence, reason)| refused(sequence, reason))
+                .or_else(|| self.queues.take())
         {
             // The buffer has room for the longest reply, so this can't fail.
             self.length = encode(&reply, &mut self.frame).map_or(0, <[u8]>::len);
@@ -117,7 +131,10 @@ impl<'q, P: Port> Link<'q, P> {
 
     /// Whether there is nothing to do until an interrupt.
     pub fn is_idle(&self) -> bool {
-        self.sent == self.length && self.answers.is_empty() && self.queues.is_empty() && self.port.is_silent()
+        self.sent == self.length
+            && self.refusals.is_empty()
+            && self.queues.is_empty()
+            && self.port.is_silent()
     }
 
     /// Frames good and bad.
@@ -126,9 +143,9 @@ impl<'q, P: Port> Link<'q, P> {
     }
 }
 
-/// The answer to a request for which there is no room.
-pub fn busy(sequence: u16) -> HandReply {
-    Reply::Answer { sequence, refused: Some(Refusal::Busy) }
+/// The answer to a request that does not get to the control task.
+pub fn refused(sequence: u16, reason: Refusal) -> HandReply {
+    Reply::Answer { sequence, refused: Some(reason) }
 }
 
 #[cfg(test)]
@@ -197,6 +214,22 @@ mod tests {
             }
         }
         panic!("the link does not come to rest");
+    }
+
+    #[test]
+    fn every_request_of_a_burst_is_answered() {
+        let mut wire = Wire::default();
+        for sequence in 0..1000 {
+            wire.say(sequence, Request::Heartbeat);
+        }
+        let mut queues = Queues::new();
+        let (mut control, end) = queues.split();
+        settle(&mut Link::new(&mut wire, end));
+        let taken: Vec<u16> = core::iter::from_fn(|| control.take()).map(|packet| packet.sequence).collect();
+        let busy: Vec<_> =
+            (taken.len() as u16..1000).map(|sequence| (sequence, Some(Refusal::Busy))).collect();
+        assert_eq!(taken, [0, 1, 2, 3, 4, 5, 6]);
+        assert_eq!(wire.answers(), busy);
     }
 
     #[test]

@@ -10,9 +10,10 @@
 
 use crate::control::{Control, Timing};
 use crate::joints::Joints;
-use crate::link::{Frames, MOST_SENT, Received, busy};
+use crate::link::{Frames, MOST_SENT, Received, refused};
 use crate::model::JOINTS;
 use crate::queue::{HandPacket, HandReply};
+use blindgrasp_shared::command::Refusal;
 use blindgrasp_shared::device::Reading;
 use blindgrasp_shared::fault::{Fault, Raised};
 use blindgrasp_shared::link::encode;
@@ -77,11 +78,11 @@ impl<'c, W: Way> Lockstep<'c, W> {
         let byte = self.way.receive()?;
         match self.frames.push(byte) {
             None => Some(()),
-            Some(Received::Unknown(answer)) => self.send(&[&answer]),
+            Some(Received::Unknown(sequence)) => self.send(&[&refused(sequence, Refusal::NotUnderstood)]),
             Some(Received::Packet(HandPacket { request: Request::Joints(sample), .. })) => self.tick(&sample),
             Some(Received::Packet(packet)) => match self.waiting.push_back(packet) {
                 Ok(()) => Some(()),
-                Err(packet) => self.send(&[&busy(packet.sequence)]),
+                Err(packet) => self.send(&[&refused(packet.sequence, Refusal::Busy)]),
             },
         }
     }

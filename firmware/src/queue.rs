@@ -15,8 +15,11 @@ pub type HandReply = Reply<'static, JOINTS>;
 
 /// Packets that wait for a tick; the control task takes one a millisecond. A queue holds one less than its size.
 const PACKETS: usize = 8;
-/// Replies and records that wait for the line.
-const REPLIES: usize = 8;
+/// Answers that wait for the line. They go before records, at most one a tick comes, and the longest record takes less
+/// than two ticks: so there is always room.
+const ANSWERS: usize = 8;
+/// Records that wait for the line.
+const RECORDS: usize = 8;
 /// A second stop before the first is acted on says nothing new.
 const STOPS: usize = 2;
 
@@ -24,23 +27,25 @@ const STOPS: usize = 2;
 pub struct Queues {
     stops: Queue<HandPacket, STOPS>,
     packets: Queue<HandPacket, PACKETS>,
-    replies: Queue<HandReply, REPLIES>,
+    answers: Queue<HandReply, ANSWERS>,
+    records: Queue<HandReply, RECORDS>,
 }
 
 impl Queues {
     /// Empty queues.
     pub const fn new() -> Self {
-        Self { stops: Queue::new(), packets: Queue::new(), replies: Queue::new() }
+        Self { stops: Queue::new(), packets: Queue::new(), answers: Queue::new(), records: Queue::new() }
     }
 
     /// Their ends: the control task's, and the link's.
     pub fn split(&mut self) -> (ControlEnd<'_>, LinkEnd<'_>) {
         let (stops_in, stops) = self.stops.split();
         let (packets_in, packets) = self.packets.split();
-        let (replies_in, replies) = self.replies.split();
+        let (answers_in, answers) = self.answers.split();
+        let (records_in, records) = self.records.split();
         (
-            ControlEnd { stops, packets, replies: replies_in, dropped: 0 },
-            LinkEnd { stops: stops_in, packets: packets_in, replies },
+            ControlEnd { stops, packets, answers: answers_in, records: records_in, dropped: 0 },
+            LinkEnd { stops: stops_in, packets: packets_in, answers, records },
         )
     }
 }
@@ -55,7 +60,8 @@ impl Default for Queues {
 pub struct ControlEnd<'q> {
     stops: Consumer<'q, HandPacket>,
     packets: Consumer<'q, HandPacket>,
-    replies: Producer<'q, HandReply>,
+    answers: Producer<'q, HandReply>,
+    records: Producer<'q, HandReply>,
     dropped: u32,
 }
 
@@ -65,9 +71,13 @@ impl ControlEnd<'_> {
         dequeue(&mut self.stops).or_else(|| dequeue(&mut self.packets))
     }
 
-    /// Leaves a reply for the line, or drops and counts it.
+    /// Leaves a reply for the line, or drops and counts it. Records never take the room of answers.
     pub fn post(&mut self, reply: HandReply) {
-        if enqueue(&mut self.replies, reply).is_err() {
+        let queue = match reply {
+            Reply::Record(_) => &mut self.records,
+            _ => &mut self.answers,
+        };
+        if enqueue(queue, reply).is_err() {
             self.dropped = self.dropped.saturating_add(1);
         }
     }
@@ -82,7 +92,8 @@ impl ControlEnd<'_> {
 pub struct LinkEnd<'q> {
     stops: Producer<'q, HandPacket>,
     packets: Producer<'q, HandPacket>,
-    replies: Consumer<'q, HandReply>,
+    answers: Consumer<'q, HandReply>,
+    records: Consumer<'q, HandReply>,
 }
 
 impl LinkEnd<'_> {
@@ -98,14 +109,14 @@ impl LinkEnd<'_> {
         }
     }
 
-    /// The next reply to send.
+    /// The next reply to send: answers before records.
     pub fn take(&mut self) -> Option<HandReply> {
-        dequeue(&mut self.replies)
+        dequeue(&mut self.answers).or_else(|| dequeue(&mut self.records))
     }
 
     /// Whether nothing waits to be sent.
     pub fn is_empty(&self) -> bool {
-        self.replies.len() == 0
+        self.answers.len() == 0 && self.records.len() == 0
     }
 }
 
@@ -131,6 +142,8 @@ pub fn dequeue<T>(queue: &mut Consumer<'_, T>) -> Option<T> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use blindgrasp_shared::device::{Device, Inputs, Reading};
+    use blindgrasp_shared::identity::{Clock, Identity, Image, ResetCause, UNITS};
 
     fn packet(sequence: u16, request: Request<JOINTS>) -> HandPacket {
         Packet { session: 1, sequence, request }
@@ -152,16 +165,42 @@ mod tests {
         assert_eq!(order, expected);
     }
 
+    fn record() -> HandReply {
+        let hand = crate::model::params();
+        let identity = Identity {
+            image: Image::decode(&crate::model::IMAGE_HAND).unwrap(),
+            units: UNITS,
+            clock: Clock::Emulated,
+            reset: ResetCause::Unknown,
+            crash: None,
+        };
+        let inputs = Inputs {
+            reading: Reading::Counts([0; JOINTS]),
+            late: false,
+            cycles: 0,
+            dropped: 0,
+            packet: None,
+        };
+        Reply::Record(Device::new(hand, identity).tick(&inputs).record)
+    }
+
     #[test]
-    fn replies_that_do_not_fit_are_counted_and_the_oldest_are_kept() {
+    fn records_that_do_not_fit_are_counted_and_answers_have_room_and_go_first() {
         let mut queues = Queues::new();
         let (mut control, mut link) = queues.split();
-        for sequence in 0..REPLIES as u16 + 2 {
+        for _ in 0..RECORDS + 2 {
+            control.post(record());
+        }
+        assert_eq!(control.dropped(), 3);
+        for sequence in 0..ANSWERS as u16 - 1 {
             control.post(Reply::Answer { sequence, refused: None });
         }
         assert_eq!(control.dropped(), 3);
-        for expected in 0..REPLIES as u16 - 1 {
+        for expected in 0..ANSWERS as u16 - 1 {
             assert!(matches!(link.take(), Some(Reply::Answer { sequence, .. }) if sequence == expected));
+        }
+        for _ in 0..RECORDS - 1 {
+            assert!(!link.is_empty() && matches!(link.take(), Some(Reply::Record(_))));
         }
         assert!(link.is_empty());
     }

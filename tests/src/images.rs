@@ -1,7 +1,13 @@
 //! The images for the microcontroller, built when they are asked for.
 
+use std::collections::BTreeMap;
+use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
+use std::sync::{Mutex, PoisonError};
+
+/// The hand that an image is for if nothing else is said.
+pub const DEFAULT_HAND: &str = "models/hands/three-finger.toml";
 
 /// The root of the repository.
 pub fn root() -> PathBuf {
@@ -13,11 +19,16 @@ pub fn root() -> PathBuf {
 /// # Panics
 /// If it does not build.
 pub fn image(kind: &str, hand: &str) -> PathBuf {
-    let output = Command::new("tests/firmware-toolchain")
+    let mut command = Command::new("tests/firmware-toolchain");
+    // As the command `pil` has it: unset and set to the default are not the same to cargo, which would build anew.
+    match hand {
+        DEFAULT_HAND => command.env_remove("HAND"),
+        _ => command.env("HAND", hand),
+    };
+    let output = command
         .args(["cargo", "build", "--quiet", "--locked", "-p", "blindgrasp-firmware", "--bin", kind])
         .args(["--profile", "firmware", "--target", "thumbv7em-none-eabihf"])
         .args(["--message-format", "json-render-diagnostics"])
-        .env("HAND", hand)
         .current_dir(root())
         .stderr(Stdio::inherit())
         .output()
@@ -29,4 +40,22 @@ pub fn image(kind: &str, hand: &str) -> PathBuf {
         rest.split_once('"').map(|(path, _)| path)
     });
     PathBuf::from(executables.next_back().expect("cargo names what it built"))
+}
+
+/// The same as a file of its own, which stays as it is while the image is built for another hand.
+///
+/// # Panics
+/// If it does not build, or can't be copied.
+pub fn kept_image(kind: &str, hand: &str) -> PathBuf {
+    static KEPT: Mutex<BTreeMap<(String, String), PathBuf>> = Mutex::new(BTreeMap::new());
+    // Building one after the other: cargo writes all hands to the same path.
+    let mut kept = KEPT.lock().unwrap_or_else(PoisonError::into_inner);
+    let path = kept.entry((kind.to_owned(), hand.to_owned())).or_insert_with(|| {
+        let built = image(kind, hand);
+        let name = Path::new(hand).file_stem().expect("the hand is a file").to_string_lossy();
+        let copy = built.with_file_name(format!("{kind}-{name}.elf"));
+        fs::copy(&built, &copy).expect("the image can be copied");
+        copy
+    });
+    path.clone()
 }

@@ -1,5 +1,7 @@
 //! Helpers that several of the tests use.
 //!
+//! - `board` (feature `firmware`): the image `hand`, running in QEMU; `conversation`: the host's end of a link, frame by
+//!   frame; `damage`: frames that a line has damaged.
 //! - [`description`]: a hand in the user's frames, with forward kinematics written a second time, straight from the
 //!   description.
 //! - [`random`]: seeded random numbers, rotations, inertias and hands.
@@ -12,6 +14,12 @@
 //! - [`supervised`]: a simulated hand whose controller is watched, with things that go wrong.
 //! - [`thumb`]: what the functions of an image for the microcontroller call, and how much stack they take.
 
+#[cfg(all(unix, feature = "firmware"))]
+pub mod board;
+#[cfg(all(unix, feature = "firmware"))]
+pub mod conversation;
+#[cfg(all(unix, feature = "firmware"))]
+pub mod damage;
 pub mod description;
 pub mod generated;
 pub mod grasps;

@@ -3,5 +3,6 @@
 mod damage;
 mod errors;
 mod frames;
+mod line;
 mod property;
 mod random;
