@@ -18,6 +18,7 @@ enum Command {
     Sim(commands::sim::Arguments),
     Pil(commands::pil::Arguments),
     Flash(commands::flash::Arguments),
+    Console(commands::console::Arguments),
 }
 
 fn main() -> ExitCode {
@@ -25,6 +26,7 @@ fn main() -> ExitCode {
         Command::Sim(arguments) => commands::sim::run(&arguments),
         Command::Pil(arguments) => commands::pil::run(&arguments),
         Command::Flash(arguments) => commands::flash::run(&arguments),
+        Command::Console(arguments) => commands::console::run(&arguments),
     };
     match outcome {
         Ok(commands::Outcome::Shown) => ExitCode::SUCCESS,

@@ -201,7 +201,7 @@ fn faults_of_counters_are_found_in_the_same_tick_as_on_the_host() {
         let neighbour = if joint % 4 == 3 { joint - 1 } else { joint + 1 };
         let frozen = [
             Injection { at_tick: AT, kind: Kind::CounterFrozen { joint } },
-            Injection { at_tick: AT + 5, kind: Kind::CounterJump { joint: neighbour, counts: -150 } },
+            Injection { at_tick: AT + 5, kind: Kind::CounterJump { joint: neighbour, counts: -400 } },
         ];
         if joint == 0 {
             // The cube and the hand are the same on both sides of this finger: nothing turns it sideways, its torque

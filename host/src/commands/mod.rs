@@ -1,5 +1,6 @@
 //! What the command line can do, a file a command.
 
+pub(crate) mod console;
 pub(crate) mod flash;
 pub(crate) mod pil;
 pub(crate) mod sim;

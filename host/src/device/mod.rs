@@ -5,6 +5,7 @@
 //! - Processor in the loop, from the ground up: [`interrupt`], whether the user wants an end; [`transport`], bytes to and
 //!   from; `qemu`, the emulator as a process; [`client`], messages and answers; [`twin`], the firmware's double on the host;
 //!   [`compare`], whether they are one; [`pil`], a hand in a simulation whose controller is the firmware.
+//! - [`talk`]: a session with a hand whose joints are real.
 
 pub mod build;
 pub mod client;
@@ -16,5 +17,6 @@ pub mod interrupt;
 pub mod pil;
 #[cfg(unix)]
 pub mod qemu;
+pub mod talk;
 pub mod transport;
 pub mod twin;

@@ -1,0 +1,532 @@
+//! `blindgrasp console`: words for a hand, and what it answers.
+
+use super::Outcome;
+use anyhow::{Context, anyhow, bail};
+use blindgrasp::device::client::{Answer, Firmware, Record, Request};
+use blindgrasp::device::talk::{self, Event, SELDOM, Talk, TalkError, telemetry};
+use blindgrasp::device::transport::{Transport, TransportError};
+use blindgrasp::scene::HandModel;
+use blindgrasp_shared::command::{self, Command, Grasp};
+use blindgrasp_shared::settings::{Each, Parameter};
+use clap::Args;
+use std::collections::VecDeque;
+use std::fmt::{Display, Write as _};
+use std::io::{self, BufRead as _, IsTerminal as _, Write as _};
+use std::sync::atomic::{AtomicU32, Ordering};
+use std::sync::mpsc::{self, Receiver, TryRecvError};
+use std::thread;
+use std::time::{Duration, Instant};
+
+/// How long nothing is looked at but the line.
+const SLICE: Duration = Duration::from_millis(10);
+/// How long a line may take no bytes.
+const SENDING: Duration = Duration::from_secs(1);
+/// What can be typed, and what it does.
+const WORDS: [(&str, &str, &str); 12] = [
+    ("help", "", "show this"),
+    ("status", "", "mode, fault, counts, torques, what limits, and what went over the line"),
+    ("arm", "", "let the joints have torque: hold their weight and damp them"),
+    ("disarm", "", "take the torque away"),
+    ("grasp", "[FORCE_N [STIFFNESS_NM]]", "close the hand and hold; without values, as configured"),
+    ("release", "", "let go slowly"),
+    ("stop", "", "take the torque away at once; so does Ctrl-C, and a second one quits"),
+    ("clear", "", "leave a fault whose cause is gone"),
+    ("get", "[KEY [INDEX]]", "show parameters"),
+    ("set", "KEY [INDEX] VALUE", "set a parameter, of all joints or axes without INDEX; disarmed only"),
+    ("watch", "MS|off", "show angles and torques all the time"),
+    ("quit", "", "stop, and end"),
+];
+
+/// Talk to a board that runs the image `hand`, a line a command
+///
+/// Type `help` for the commands; they are taken one by one, from a terminal or a script. The heartbeat is kept all the
+/// time. Ctrl-C stops the hand, a second one ends the program, as the end of the input does; the hand is stopped first.
+///
+/// Exit code 0: ended, and the hand has confirmed the stop; 2: bad usage, nobody answers, or the line was lost.
+#[derive(Args)]
+pub(crate) struct Arguments {
+    /// A serial port (/dev/ttyUSB0, COM3), or unix:PATH for a socket at which somebody listens
+    #[arg(long, value_name = "PORT")]
+    port: String,
+    /// The hand's file, if it is not built in: for angles and the joints' names
+    #[arg(long, value_name = "HAND")]
+    hand: Option<String>,
+}
+
+static INTERRUPTS: AtomicU32 = AtomicU32::new(0);
+
+/// Runs the command.
+pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
+    let mut line = talk::open(&arguments.port)?;
+    // Without the handler Ctrl-C ends the program; the hand then lets go for want of a heartbeat.
+    let _ = ctrlc::set_handler(|| {
+        if INTERRUPTS.fetch_add(1, Ordering::Relaxed) >= 2 {
+            std::process::exit(130);
+        }
+    });
+    let mut console = Console {
+        talk: Talk::new(talk::PATIENCE, Instant::now()),
+        wanted_hand: arguments.hand.clone(),
+        typed: Typed::listen(),
+        joint_count: 0,
+        period_us: 1000,
+        hand: None,
+        status: Status::Shown,
+        watch_ticks: None,
+        watched: None,
+        interrupts: 0,
+        is_quitting: false,
+        is_over: false,
+    };
+    let ended = console.run(&mut *line).with_context(|| format!("port {}", arguments.port));
+    if ended.is_err() {
+        // Whatever it was: nobody leads the hand any more. If the line is gone, so is the heartbeat.
+        let now = Instant::now();
+        console.talk.ask(Request::Command(Command::Stop), now);
+        let _ = line.send(&console.talk.outgoing(), now + SENDING);
+    }
+    ended.map(|()| Outcome::Shown)
+}
+
+/// Lines from stdin.
+struct Typed {
+    incoming: Receiver<String>,
+    lines: VecDeque<String>,
+    has_ended: bool,
+    by_hand: bool,
+}
+
+impl Typed {
+    /// Reads in a thread that nobody waits for.
+    fn listen() -> Self {
+        let (lines, incoming) = mpsc::channel();
+        thread::spawn(move || {
+            io::stdin().lock().lines().map_while(Result::ok).try_for_each(|line| lines.send(line))
+        });
+        Self { incoming, lines: VecDeque::new(), has_ended: false, by_hand: io::stdin().is_terminal() }
+    }
+
+    fn look(&mut self) {
+        loop {
+            match self.incoming.try_recv() {
+                Ok(line) => self.lines.push_back(line),
+                Err(TryRecvError::Empty) => return,
+                Err(TryRecvError::Disconnected) => {
+                    self.has_ended = true;
+                    return;
+                }
+            }
+        }
+    }
+}
+
+/// Whether the status is still to be shown.
+#[derive(PartialEq)]
+enum Status {
+    Shown,
+    /// A fresh record was asked for.
+    Asked,
+    /// It is the next that comes.
+    Next,
+}
+
+struct Console {
+    talk: Talk,
+    wanted_hand: Option<String>,
+    typed: Typed,
+    joint_count: usize,
+    period_us: u32,
+    /// What the firmware was built with, if that is known.
+    hand: Option<HandModel>,
+    status: Status,
+    /// From one line of `watch` to the next.
+    watch_ticks: Option<u32>,
+    /// Tick of the last one.
+    watched: Option<u32>,
+    /// Those that were seen.
+    interrupts: u32,
+    is_quitting: bool,
+    is_over: bool,
+}
+
+impl Console {
+    fn run(&mut self, line: &mut dyn Transport) -> anyhow::Result<()> {
+        let mut buffer = [0; 4096];
+        loop {
+            let now = Instant::now();
+            self.talk.turn(now).map_err(explained)?;
+            while let Some(event) = self.talk.event() {
+                self.show(event)?;
+            }
+            if self.is_over {
+                return Ok(());
+            }
+            self.obey(now)?;
+            line.send(&self.talk.outgoing(), now + SENDING).map_err(lost)?;
+            let deadline = self.talk.due().clamp(now + Duration::from_millis(1), now + SLICE);
+            match line.receive(&mut buffer, deadline) {
+                Ok(count) => self.talk.take(&buffer[..count], Instant::now())?,
+                Err(TransportError::TimedOut) => {}
+                Err(error) => return Err(lost(error)),
+            }
+        }
+    }
+
+    /// Does what the user wants: one thing at a time, but a stop at once.
+    fn obey(&mut self, now: Instant) -> anyhow::Result<()> {
+        let interrupts = INTERRUPTS.load(Ordering::Relaxed);
+        if interrupts > self.interrupts {
+            self.interrupts = interrupts;
+            self.typed.lines.clear();
+            self.stop(interrupts > 1, now);
+        }
+        self.typed.look();
+        if self.typed.by_hand && self.typed.lines.iter().any(|line| line.trim() == "stop") {
+            self.typed.lines.clear();
+            self.stop(false, now);
+        }
+        if self.talk.is_idle() && self.status == Status::Shown && !self.is_quitting {
+            match self.typed.lines.pop_front() {
+                Some(line) => {
+                    if let Err(error) = self.execute(&line, now) {
+                        eprintln!("blindgrasp: {error:#}");
+                    }
+                }
+                None if self.typed.has_ended => self.stop(true, now),
+                None => {}
+            }
+        }
+        Ok(())
+    }
+
+    fn stop(&mut self, quit: bool, now: Instant) {
+        self.is_quitting |= quit;
+        self.talk.ask(Request::Command(Command::Stop), now);
+    }
+
+    fn execute(&mut self, line: &str, now: Instant) -> anyhow::Result<()> {
+        let words: Vec<&str> = line.split_whitespace().collect();
+        let Some((&word, rest)) = words.split_first() else { return Ok(()) };
+        let command = match (word, rest) {
+            ("arm", []) => Command::Arm,
+            ("disarm", []) => Command::Disarm,
+            ("release", []) => Command::Release,
+            ("stop", []) => Command::Stop,
+            ("clear", []) => Command::ClearFault,
+            ("grasp", [] | [_] | [_, _]) => {
+                let value = |at: usize| rest.get(at).map(|word| number(word)).transpose();
+                Command::Grasp(Grasp { force_n: value(0)?, attitude_stiffness_nm: value(1)? })
+            }
+            ("help", []) => {
+                for (word, values, words) in WORDS {
+                    say(format_args!("{:<30}  {words}", format!("{word} {values}")))?;
+                }
+                return Ok(());
+            }
+            ("status", []) => {
+                self.status = Status::Asked;
+                self.talk.ask(telemetry(self.decimation()), now);
+                return Ok(());
+            }
+            ("quit", []) => {
+                self.stop(true, now);
+                return Ok(());
+            }
+            ("watch", [interval]) => {
+                self.watch(interval)?;
+                self.talk.ask(telemetry(self.decimation()), now);
+                return Ok(());
+            }
+            ("get", []) => return self.get(Parameter::ALL, None, now),
+            ("get", [key]) => return self.get(&[parameter(key)?], None, now),
+            ("get", [key, index]) => return self.get(&[parameter(key)?], Some(integer(index)?), now),
+            ("set", [key, value]) => return self.set(parameter(key)?, None, number(value)?, now),
+            ("set", [key, index, value]) => {
+                return self.set(parameter(key)?, Some(integer(index)?), number(value)?, now);
+            }
+            _ => bail!(misuse(word)),
+        };
+        self.talk.ask(Request::Command(command), now);
+        Ok(())
+    }
+
+    fn get(&mut self, parameters: &[Parameter], index: Option<u8>, now: Instant) -> anyhow::Result<()> {
+        for &parameter in parameters {
+            for index in self.indices(parameter, index) {
+                self.talk.ask(Request::GetParameter { parameter, index }, now);
+            }
+        }
+        Ok(())
+    }
+
+    fn set(
+        &mut self,
+        parameter: Parameter,
+        index: Option<u8>,
+        value: f32,
+        now: Instant,
+    ) -> anyhow::Result<()> {
+        for index in self.indices(parameter, index) {
+            self.talk.ask(Request::SetParameter { parameter, index, value }, now);
+        }
+        Ok(())
+    }
+
+    /// The one index, or all that a parameter has.
+    fn indices(&self, parameter: Parameter, index: Option<u8>) -> std::ops::Range<u8> {
+        let count = match parameter.each() {
+            Each::Hand => 1,
+            Each::Joint => u8::try_from(self.joint_count).unwrap_or(u8::MAX),
+            Each::Axis => 3,
+        };
+        index.map_or(0..count, |index| index..index.saturating_add(1))
+    }
+
+    fn watch(&mut self, interval: &str) -> anyhow::Result<()> {
+        self.watched = None;
+        self.watch_ticks = match interval {
+            "off" => None,
+            ms => {
+                let ms: u32 = ms.parse().ok().filter(|ms| (5..=60_000).contains(ms)).with_context(|| {
+                    format!("watch: `{ms}` is neither `off` nor whole milliseconds from 5 to 60000")
+                })?;
+                Some((ms * 1000).div_ceil(self.period_us.max(1)))
+            }
+        };
+        Ok(())
+    }
+
+    /// Ticks from one record to the next.
+    fn decimation(&self) -> u16 {
+        self.watch_ticks.and_then(|ticks| u16::try_from(ticks).ok()).map_or(SELDOM, |ticks| ticks.min(SELDOM))
+    }
+
+    fn show(&mut self, event: Event) -> anyhow::Result<()> {
+        match event {
+            Event::Open { firmware, period_us } => self.greet(&firmware, period_us),
+            Event::StartedAnew => {
+                (self.status, self.watch_ticks) = (Status::Shown, None);
+                self.typed.lines.clear();
+                say("the device was reset: it has forgotten the session, and what was set; hello again")?;
+                if !self.typed.by_hand {
+                    // It might arm with other limits than it has set.
+                    bail!("the device was reset, which ends a script");
+                }
+                Ok(())
+            }
+            Event::Mode(mode) => say(format_args!("mode: {}", mode.words())),
+            Event::Fault(None) => say("fault: none any more"),
+            Event::Fault(Some(raised)) => say(format_args!("{raised}; {}", raised.fault.remedy())),
+            Event::Answer(Request::Telemetry { .. }, Answer::Done) => {
+                if self.status == Status::Asked {
+                    self.status = Status::Next;
+                }
+                Ok(())
+            }
+            Event::Answer(request, answer) => {
+                match (&request, &answer) {
+                    (Request::Telemetry { .. }, _) => self.status = Status::Shown,
+                    (Request::Command(Command::Stop), Answer::Done) => self.is_over = self.is_quitting,
+                    (Request::Command(Command::Stop), _) if self.is_quitting => {
+                        bail!("{}: take the motors' power away", answered(&request, &answer))
+                    }
+                    _ => {}
+                }
+                say(answered(&request, &answer))
+            }
+            Event::Unsent(request) => say(format_args!("{}: not sent, because of stop", name(&request))),
+            Event::Unanswered(Request::Command(Command::Stop)) => {
+                let words = "stop: NO ANSWER: take the motors' power away";
+                if self.is_quitting {
+                    bail!(words);
+                }
+                eprintln!("blindgrasp: {words}");
+                Ok(())
+            }
+            Event::Unanswered(request) => {
+                self.status = Status::Shown;
+                eprintln!("blindgrasp: {}: no answer; whether it was done is not known", name(&request));
+                Ok(())
+            }
+            Event::Record(record) => self.look(&record),
+        }
+    }
+
+    fn greet(&mut self, firmware: &Firmware, period_us: u32) -> anyhow::Result<()> {
+        (self.joint_count, self.period_us) = (firmware.joint_count, period_us);
+        say(&firmware.words)?;
+        let crash = firmware.crash.map_or("none".to_owned(), |crash| crash.to_string());
+        say(format_args!("clock: {}; started by: {}", firmware.clock.words(), firmware.reset.words()))?;
+        say(format_args!("last crash: {crash}"))?;
+        let file = self.wanted_hand.as_deref().unwrap_or(&firmware.hand);
+        self.hand = match HandModel::load(file) {
+            Ok(hand) if hand.hash() == firmware.hand_hash => Some(hand),
+            Ok(_) => {
+                eprintln!(
+                    "blindgrasp: warning: no angles: the firmware was built with another hand than `{file}`; name its file with --hand"
+                );
+                None
+            }
+            Err(error) => {
+                eprintln!("blindgrasp: warning: no angles: {error}; name the hand's file with --hand");
+                None
+            }
+        };
+        Ok(())
+    }
+
+    fn look(&mut self, record: &Record) -> anyhow::Result<()> {
+        if self.status == Status::Next {
+            self.status = Status::Shown;
+            say(self.table(record).trim_end())?;
+        }
+        if let Some(ticks) = self.watch_ticks
+            && self.watched.is_none_or(|watched| record.tick.wrapping_sub(watched) >= ticks)
+        {
+            self.watched = Some(record.tick);
+            let time_s = f64::from(record.tick) * f64::from(self.period_us) * 1e-6;
+            let mut line = format!("{time_s:.3} s {}", record.mode.words());
+            let mut column = |title: &str, values: &mut dyn Iterator<Item = String>| {
+                line = values.fold(format!("{line} {title}"), |line, value| line + " " + &value);
+            };
+            match (record.counts.as_slice(), &self.hand) {
+                ([], _) => column("joints not read", &mut std::iter::empty()),
+                (counts, None) => column("counts", &mut counts.iter().map(ToString::to_string)),
+                (counts, Some(_)) => {
+                    let angles = (0..counts.len()).filter_map(|k| self.angle_rad(record, k));
+                    column("angles_rad", &mut angles.map(|rad| format!("{rad:.3}")));
+                }
+            }
+            column("torques_nm", &mut record.torques_nm.iter().map(|nm| format!("{nm:.4}")));
+            say(line)?;
+        }
+        Ok(())
+    }
+
+    /// Angle of a joint as its count tells it, if the hand is known and was read.
+    fn angle_rad(&self, record: &Record, joint: usize) -> Option<f32> {
+        let encoder = self.hand.as_ref()?.config.estimator.encoders.get(joint)?;
+        let turned = record.counts.as_slice().get(joint)?.wrapping_sub(encoder.zero_count) as f32
+            * encoder.rad_per_count;
+        Some(if encoder.reversed { -turned } else { turned })
+    }
+
+    fn table(&self, record: &Record) -> String {
+        let mut text = format!("mode       {}\n", record.mode.words());
+        let mut row = |name: &str, value: String| text += &format!("{name:<11}{value}\n");
+        row(
+            "fault",
+            record.fault.map_or("none".to_owned(), |raised| format!("{raised}; {}", raised.fault.remedy())),
+        );
+        if let Some(raised) = record.reading_failed {
+            row("joints", format!("not read: {raised}"));
+        }
+        row("grasp", format!("{} N, {} N m", record.force_n, record.attitude_stiffness_nm));
+        row("energy", format!("{:.6} J", record.energy_j));
+        row("cycles", record.cycles.to_string());
+        row("lost", format!("{} records and answers", record.dropped));
+        row("link", self.talk.traffic().to_string());
+        let names = self.hand.as_ref().map_or(&[][..], |hand| &hand.joint_names);
+        let cell = |value: Option<String>| value.unwrap_or_else(|| "-".to_owned());
+        text += &format!(
+            "{:<5} {:<18} {:>10} {:>9} {:>9}  limited by\n",
+            "joint", "name", "count", "angle_rad", "torque_nm"
+        );
+        for k in 0..self.joint_count {
+            let _ = writeln!(
+                text,
+                "{k:<5} {:<18} {:>10} {:>9} {:>9}  {}",
+                cell(names.get(k).cloned()),
+                cell(record.counts.as_slice().get(k).map(ToString::to_string)),
+                cell(self.angle_rad(record, k).map(|rad| format!("{rad:.3}"))),
+                cell(record.torques_nm.as_slice().get(k).map(|nm| format!("{nm:.4}"))),
+                cell(record.limiting.as_slice().get(k).map(ToString::to_string)),
+            );
+        }
+        text
+    }
+}
+
+/// Prints a line.
+fn say(line: impl Display) -> anyhow::Result<()> {
+    writeln!(io::stdout().lock(), "{line}").context("cannot print")
+}
+
+/// Why the line ended.
+fn lost(error: TransportError) -> anyhow::Error {
+    anyhow!(error).context("the line is lost")
+}
+
+/// Why nobody answers, with the ports that there are.
+fn explained(error: TalkError) -> anyhow::Error {
+    let is_alone = matches!(error, TalkError::NobodyThere(..));
+    match serial_ports() {
+        Some(ports) if is_alone => anyhow!("{error}; this machine has the serial ports {ports}"),
+        _ if is_alone => anyhow!("{error}; this machine has no serial ports"),
+        _ => error.into(),
+    }
+}
+
+fn serial_ports() -> Option<String> {
+    let mut ports = serial2::SerialPort::available_ports().ok().filter(|ports| !ports.is_empty())?;
+    ports.sort();
+    Some(ports.iter().map(|port| port.display().to_string()).collect::<Vec<_>>().join(", "))
+}
+
+/// What was asked for, as it was typed.
+fn name(request: &Request) -> String {
+    let indexed = |parameter: Parameter, index| match parameter.each() {
+        Each::Hand if index == 0 => parameter.key().to_owned(),
+        _ => format!("{parameter}[{index}]"),
+    };
+    match *request {
+        Request::Command(command) => command.words().to_owned(),
+        Request::GetParameter { parameter, index } => indexed(parameter, index),
+        Request::SetParameter { parameter, index, value } => {
+            format!("{} = {value}", indexed(parameter, index))
+        }
+        _ => "records".to_owned(),
+    }
+}
+
+/// An answer in words.
+fn answered(request: &Request, answer: &Answer) -> String {
+    match (request, answer) {
+        (&Request::Command(command), Answer::Done) => command::Answer { command, refused: None }.to_string(),
+        (Request::GetParameter { parameter, .. }, Answer::Value(value)) => {
+            format!("{} = {value}  ({})", name(request), parameter.words())
+        }
+        (request, Answer::Refused(refusal)) => format!("{}: refused, {}", name(request), refusal.words()),
+        (request, _) => format!("{}: done", name(request)),
+    }
+}
+
+fn parameter(key: &str) -> anyhow::Result<Parameter> {
+    Parameter::ALL.iter().copied().find(|parameter| parameter.key() == key).with_context(|| {
+        let keys = Parameter::ALL.iter().map(|parameter| parameter.key());
+        format!("`{key}` is no parameter: {}", similar(key, keys).unwrap_or("type `get` for all".to_owned()))
+    })
+}
+
+fn number(word: &str) -> anyhow::Result<f32> {
+    word.parse().with_context(|| format!("`{word}` is not a number"))
+}
+
+fn integer(word: &str) -> anyhow::Result<u8> {
+    word.parse().with_context(|| format!("`{word}` is not an index from 0 to 255"))
+}
+
+/// What is wrong with a line that begins with this word.
+fn misuse(word: &str) -> String {
+    if let Some((word, values, words)) = WORDS.iter().find(|(known, ..)| *known == word) {
+        return format!("use: {}: {words}", format!("{word} {values}").trim_end());
+    }
+    let known = WORDS.iter().map(|&(known, ..)| known);
+    format!("`{word}` is no command: {}", similar(word, known).unwrap_or("type `help` for all".to_owned()))
+}
+
+fn similar<'a>(word: &str, known: impl Iterator<Item = &'a str>) -> Option<String> {
+    let likeness = |candidate: &str| strsim::jaro_winkler(word, candidate);
+    let best = known.max_by(|a, b| likeness(a).total_cmp(&likeness(b)))?;
+    (likeness(best) > 0.8).then(|| format!("did you mean `{best}`?"))
+}

@@ -1,0 +1,435 @@
+//! A talk with the image `hand`, which does its ticks whether it is asked or not: requests go out, and answers and records
+//! come in, in whatever order.
+//!
+//! [`Talk`] knows neither lines nor clocks: it is given bytes and the time, and gives bytes and events. It says hello until
+//! it is heard, and then keeps the heartbeat going; a hand with torque lets go without it. What is asked is asked a few at a
+//! time, because the firmware has little room, and told when it is not answered; only `Stop`, which may be repeated, is
+//! sent again, and ahead of all that waits. A device that was reset knows nothing of the session: another one begins.
+
+use super::client::{Answer, Firmware, Packet, Patience, Record, Request, Traffic};
+#[cfg(unix)]
+use super::transport::Streams;
+use super::transport::{BAUD, OpenError, SerialPort, Transport};
+use crate::MAX_JOINTS;
+use blindgrasp_shared::command::{Command, Refusal};
+use blindgrasp_shared::fault::Raised;
+use blindgrasp_shared::link::message::{Reply, Signals};
+use blindgrasp_shared::link::{Receiver, encode, most_bytes};
+use blindgrasp_shared::settings::Parameter;
+use blindgrasp_shared::supervisor::Mode;
+use blindgrasp_shared::telemetry::INTERFACE_VERSION;
+use std::collections::VecDeque;
+use std::io;
+use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
+
+/// Most payload and CRC of a reply.
+const MOST_RECEIVED: usize = Reply::<MAX_JOINTS>::MOST_BYTES + 4;
+/// Most bytes of a request on the wire.
+const MOST_SENT: usize = most_bytes(Packet::MOST_BYTES);
+/// From one hello to the next.
+const HELLO_AGAIN: Duration = Duration::from_millis(500);
+/// From one heartbeat to the next, before it is known how many are wanted, or if none are: then they show that the line
+/// is there.
+const HEARTBEAT: Duration = Duration::from_millis(50);
+/// Heartbeats in the time that they may fail.
+const HEARTBEATS: f32 = 3.0;
+/// How long a `Stop` may be unanswered before it is sent again, and how often it is sent.
+const STOP_AGAIN: Duration = Duration::from_millis(100);
+const STOPS: u8 = 5;
+/// Requests that may be unanswered at once, besides heartbeats; the firmware has room for eight.
+const WINDOW: usize = 4;
+/// Ticks from one record to the next, if nobody wants more: often enough to tell of changes.
+pub const SELDOM: u16 = 100;
+
+/// A request for records with everything in them.
+pub const fn telemetry(decimation: u16) -> Request {
+    Request::Telemetry { decimation, signals: Signals::ALL }
+}
+
+/// How long to wait for a hand: it is there, and answers within a tick or two.
+pub const PATIENCE: Patience = Patience { start: Duration::from_secs(3), answer: Duration::from_secs(1) };
+
+/// What happened.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Event {
+    /// A session began.
+    Open {
+        /// With whom.
+        firmware: Firmware,
+        /// Time from one of its ticks to the next, us.
+        period_us: u32,
+    },
+    /// The device does not know the session: it was reset. What was asked is lost; hello is said again.
+    StartedAnew,
+    /// A request was answered.
+    Answer(Request, Answer),
+    /// A request was not answered in time: whether it was done is not known.
+    Unanswered(Request),
+    /// A request was not sent, because `Stop` came after it.
+    Unsent(Request),
+    /// The mode is another than in the record before, or is known for the first time.
+    Mode(Mode),
+    /// The same for the fault.
+    Fault(Option<Raised>),
+    /// A record came.
+    Record(Record),
+}
+
+/// Why there is no talk any more.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum TalkError {
+    /// Nothing that answers.
+    #[error(
+        "nothing answers within {} s{}: check supply, cable (TX and RX crossed, ground) and port, and that the image `hand` is flashed; the image `pil` talks to `blindgrasp pil` only",
+        .0.as_secs_f64(), heard(.1)
+    )]
+    NobodyThere(Duration, Traffic),
+    /// Something answers, but not as a hand does.
+    #[error(
+        "the firmware has interface version {theirs}, this program {INTERFACE_VERSION}: build and flash the firmware that belongs to this program"
+    )]
+    OtherInterface {
+        /// Its version.
+        theirs: u16,
+    },
+    /// It answered, and does not any more.
+    #[error("the line is lost: nothing came for {} s{}", .0.as_secs_f64(), heard(.1))]
+    Silence(Duration, Traffic),
+}
+
+/// What came over the line instead of answers.
+fn heard(traffic: &Traffic) -> String {
+    match traffic {
+        Traffic { frames_received: 0, frames_damaged: 0, bytes_received: 0, .. } => String::new(),
+        Traffic { frames_received: 0, bytes_received, .. } => format!(
+            " but garbage ({bytes_received} bytes without a good frame: another program, or not {BAUD} baud)"
+        ),
+        traffic => format!(" (so far {traffic})"),
+    }
+}
+
+/// A request that was sent.
+struct Asked {
+    sequence: u16,
+    request: Request,
+    /// Whether the user wants to know what becomes of it.
+    told: bool,
+    deadline: Instant,
+    /// How often it may still be sent.
+    again: u8,
+}
+
+/// The host's end of a session.
+pub struct Talk {
+    patience: Patience,
+    receiver: Receiver<MOST_RECEIVED>,
+    /// Number of the session, if there is one.
+    session: Option<u16>,
+    /// Number of the last request.
+    sequence: u16,
+    /// Since when hello is said.
+    begun: Instant,
+    /// When the last good frame came.
+    heard: Instant,
+    /// When the next hello, or heartbeat, is due.
+    due: Instant,
+    heartbeat: Duration,
+    waiting: VecDeque<(Request, bool)>,
+    asked: Vec<Asked>,
+    outgoing: Vec<u8>,
+    events: VecDeque<Event>,
+    /// Mode and fault of the last record.
+    state: Option<(Mode, Option<Raised>)>,
+    traffic: Traffic,
+}
+
+impl Talk {
+    /// Begins to say hello.
+    pub fn new(patience: Patience, now: Instant) -> Self {
+        Self {
+            patience,
+            receiver: Receiver::new(),
+            session: None,
+            sequence: 0,
+            begun: now,
+            heard: now,
+            due: now,
+            heartbeat: HEARTBEAT,
+            waiting: VecDeque::new(),
+            asked: Vec::new(),
+            outgoing: Vec::new(),
+            events: VecDeque::new(),
+            state: None,
+            traffic: Traffic::default(),
+        }
+    }
+
+    /// Asks for something. `Stop` goes at once, session or not, and takes the place of all that waits.
+    pub fn ask(&mut self, request: Request, now: Instant) {
+        if request == Request::Command(Command::Stop) {
+            let unsent = self.waiting.drain(..).filter(|&(_, told)| told);
+            self.events.extend(unsent.map(|(request, _)| Event::Unsent(request)));
+            self.send(request, true, STOPS, now);
+        } else {
+            self.waiting.push_back((request, true));
+            self.send_waiting(now);
+        }
+    }
+
+    /// Takes bytes that came.
+    ///
+    /// # Errors
+    /// If they come from a firmware of another interface version.
+    pub fn take(&mut self, bytes: &[u8], now: Instant) -> Result<(), TalkError> {
+        self.traffic.bytes_received += bytes.len() as u64;
+        for &byte in bytes {
+            let payload = match self.receiver.push(byte) {
+                None => continue,
+                Some(Ok(payload)) => payload.to_vec(),
+                Some(Err(_)) => {
+                    self.traffic.frames_damaged += 1;
+                    continue;
+                }
+            };
+            self.traffic.frames_received += 1;
+            self.heard = now;
+            match Reply::<MAX_JOINTS>::decode(&payload) {
+                Ok(reply) => self.hear(reply, now)?,
+                Err(_) => match other_interface(&payload) {
+                    Some(theirs) => return Err(TalkError::OtherInterface { theirs }),
+                    None => self.traffic.frames_unexpected += 1,
+                },
+            }
+        }
+        self.send_waiting(now);
+        Ok(())
+    }
+
+    /// Does what is due at this time: hello, heartbeat, looking after what is not answered.
+    ///
+    /// # Errors
+    /// If nobody is there, or not any more.
+    pub fn turn(&mut self, now: Instant) -> Result<(), TalkError> {
+        match self.session {
+            None if now - self.begun >= self.patience.start => {
+                return Err(TalkError::NobodyThere(self.patience.start, self.traffic));
+            }
+            Some(_) if now.saturating_duration_since(self.heard) >= self.patience.answer => {
+                return Err(TalkError::Silence(self.patience.answer, self.traffic));
+            }
+            _ => {}
+        }
+        let (late, asked) = self.asked.drain(..).partition(|asked| asked.deadline <= now);
+        self.asked = asked;
+        let late: Vec<Asked> = late;
+        for Asked { request, told, again, .. } in late {
+            if again > 0 {
+                self.send(request, told, again, now);
+            } else if told {
+                self.events.push_back(Event::Unanswered(request));
+            }
+        }
+        if now >= self.due {
+            let request = match self.session {
+                None => {
+                    // Whatever was on the line before ends here. Of hellos, only the last one's session lasts.
+                    self.outgoing.push(0);
+                    self.asked.retain(|asked| !matches!(asked.request, Request::Hello { .. }));
+                    self.due = now + HELLO_AGAIN;
+                    Request::Hello { interface_version: INTERFACE_VERSION }
+                }
+                Some(_) => {
+                    self.due = now + self.heartbeat;
+                    Request::Heartbeat
+                }
+            };
+            self.send(request, false, 1, now);
+        }
+        self.send_waiting(now);
+        Ok(())
+    }
+
+    /// When [`Self::turn`] has something to do next, at the latest.
+    pub fn due(&self) -> Instant {
+        self.asked.iter().map(|asked| asked.deadline).fold(self.due, Instant::min)
+    }
+
+    /// What is to be sent; it counts as sent.
+    pub fn outgoing(&mut self) -> Vec<u8> {
+        self.traffic.bytes_sent += self.outgoing.len() as u64;
+        std::mem::take(&mut self.outgoing)
+    }
+
+    /// The oldest event that was not told yet.
+    pub fn event(&mut self) -> Option<Event> {
+        self.events.pop_front()
+    }
+
+    /// Whether there is a session, and everything that was asked is answered.
+    pub fn is_idle(&self) -> bool {
+        self.session.is_some() && self.waiting.is_empty() && !self.asked.iter().any(|asked| asked.told)
+    }
+
+    /// What went over the line.
+    pub fn traffic(&self) -> &Traffic {
+        &self.traffic
+    }
+
+    fn send_waiting(&mut self, now: Instant) {
+        let busy = |asked: &&Asked| asked.request != Request::Heartbeat;
+        while self.session.is_some()
+            && self.asked.iter().filter(busy).count() < WINDOW
+            && let Some((request, told)) = self.waiting.pop_front()
+        {
+            self.send(request, told, 1, now);
+        }
+    }
+
+    /// Sends a request, the first of so many times.
+    fn send(&mut self, request: Request, told: bool, times: u8, now: Instant) {
+        self.sequence = self.sequence.wrapping_add(1);
+        let sequence = self.sequence;
+        let packet = Packet { session: self.session.unwrap_or(0), sequence, request };
+        let mut buffer = [0; MOST_SENT];
+        // The buffer is as large as the largest request.
+        if let Ok(frame) = encode(&packet, &mut buffer) {
+            self.outgoing.extend_from_slice(frame);
+            self.traffic.frames_sent += 1;
+        }
+        let wait = if times > 1 { STOP_AGAIN } else { self.patience.answer };
+        let request = packet.request;
+        self.asked.push(Asked { sequence, request, told, deadline: now + wait, again: times - 1 });
+    }
+
+    fn hear(&mut self, reply: Reply<'_, MAX_JOINTS>, now: Instant) -> Result<(), TalkError> {
+        let (sequence, answer) = match reply {
+            Reply::Record(record) => {
+                self.look(record);
+                return Ok(());
+            }
+            Reply::Identity { sequence, session, identity } => {
+                let theirs = identity.image.interface_version;
+                if theirs != INTERFACE_VERSION {
+                    return Err(TalkError::OtherInterface { theirs });
+                }
+                if self.take_asked(sequence).is_some() {
+                    let (firmware, period_us) = (Firmware::from(&identity), identity.image.period_us);
+                    self.open(session, now);
+                    self.events.push_back(Event::Open { firmware, period_us });
+                }
+                return Ok(());
+            }
+            Reply::Answer { sequence, refused } => (sequence, refused.map_or(Answer::Done, Answer::Refused)),
+            Reply::Value { sequence, value, .. } => (sequence, Answer::Value(value)),
+        };
+        let Some(asked) = self.take_asked(sequence) else { return Ok(()) };
+        if asked.again > 0 && answer == Answer::Refused(Refusal::Busy) {
+            // It is sent again when its time is over.
+            self.asked.push(asked);
+            return Ok(());
+        }
+        let Asked { request, told, .. } = asked;
+        let heartbeat_ms = match (&request, &answer) {
+            (Request::GetParameter { parameter: Parameter::HeartbeatTime, .. }, &Answer::Value(ms)) => {
+                Some(ms)
+            }
+            (&Request::SetParameter { parameter: Parameter::HeartbeatTime, value, .. }, Answer::Done) => {
+                Some(value)
+            }
+            _ => None,
+        };
+        if let Some(ms) = heartbeat_ms {
+            self.heartbeat = Duration::from_secs_f32((ms / HEARTBEATS).clamp(1.0, 1000.0) / 1e3);
+            self.due = self.due.min(now + self.heartbeat);
+        }
+        let is_forgotten = answer == Answer::Refused(Refusal::NoSession);
+        if told {
+            self.events.push_back(Event::Answer(request, answer));
+        }
+        if is_forgotten {
+            self.start_anew(now);
+        }
+        Ok(())
+    }
+
+    /// The request that an answer belongs to.
+    fn take_asked(&mut self, sequence: u16) -> Option<Asked> {
+        let at = self.asked.iter().position(|asked| asked.sequence == sequence);
+        if at.is_none() {
+            self.traffic.frames_unexpected += 1;
+        }
+        at.map(|at| self.asked.remove(at))
+    }
+
+    fn open(&mut self, session: u16, now: Instant) {
+        self.session = Some(session);
+        (self.heartbeat, self.due) = (HEARTBEAT, now);
+        let heartbeat = Request::GetParameter { parameter: Parameter::HeartbeatTime, index: 0 };
+        // Ahead of what the user asked for meanwhile.
+        self.waiting.push_front((telemetry(SELDOM), false));
+        self.waiting.push_front((heartbeat, false));
+    }
+
+    fn start_anew(&mut self, now: Instant) {
+        self.session = None;
+        (self.begun, self.due, self.state) = (now, now, None);
+        self.events.push_back(Event::StartedAnew);
+        let (asked, waiting) = (self.asked.drain(..), self.waiting.drain(..));
+        let lost = asked.map(|asked| (asked.request, asked.told)).chain(waiting).filter(|&(_, told)| told);
+        self.events.extend(lost.map(|(request, _)| Event::Unanswered(request)));
+    }
+
+    /// Looks for what is new in a record.
+    fn look(&mut self, record: Record) {
+        let (mode, fault) = self.state.map_or((None, None), |(mode, fault)| (Some(mode), fault));
+        if mode != Some(record.mode) {
+            self.events.push_back(Event::Mode(record.mode));
+        }
+        if fault != record.fault {
+            self.events.push_back(Event::Fault(record.fault));
+        }
+        self.state = Some((record.mode, record.fault));
+        self.events.push_back(Event::Record(record));
+    }
+}
+
+/// The interface version of a firmware whose introduction can't be read: that is what every version begins with.
+fn other_interface(payload: &[u8]) -> Option<u16> {
+    let (identity, _, _, theirs) = postcard::take_from_bytes::<(u8, u16, u16, u16)>(payload).ok()?.0;
+    (identity == 0 && theirs != INTERFACE_VERSION).then_some(theirs)
+}
+
+/// Why a line could not be opened.
+#[derive(Debug, thiserror::Error)]
+pub enum LineError {
+    /// It is no serial port that can be used.
+    #[error(transparent)]
+    Serial(#[from] OpenError),
+    /// Nobody listens at a socket.
+    #[error("cannot connect to the socket {}: does somebody listen there?", .path.display())]
+    Socket {
+        /// Its path.
+        path: PathBuf,
+        /// Why not.
+        source: io::Error,
+    },
+}
+
+/// Opens a line: a serial port, or `unix:PATH`, a socket at which somebody listens, such as QEMU.
+///
+/// # Errors
+/// If it can't be opened.
+pub fn open(port: &str) -> Result<Box<dyn Transport>, LineError> {
+    #[cfg(unix)]
+    if let Some(path) = port.strip_prefix("unix:") {
+        let connect = || {
+            let socket = std::os::unix::net::UnixStream::connect(path)?;
+            socket.set_nonblocking(true)?;
+            Ok(Streams { from: socket.try_clone()?, to: socket })
+        };
+        let socket = connect().map_err(|source| LineError::Socket { path: path.into(), source })?;
+        return Ok(Box::new(socket));
+    }
+    Ok(Box::new(SerialPort::open(Path::new(port), BAUD)?))
+}

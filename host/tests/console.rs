@@ -1,0 +1,570 @@
+//! `blindgrasp console` and the talk behind it, against the device of `blindgrasp-shared`: in simulated time where the
+//! time matters, and as a command with a socket for its port.
+
+use blindgrasp::device::client::{Answer, Packet, Request};
+use blindgrasp::device::talk::{Event, PATIENCE, Talk, TalkError};
+use blindgrasp::scene::HandModel;
+use blindgrasp::{MAX_FINGERS, MAX_JOINTS};
+use blindgrasp_shared::command::{Command, Refusal};
+use blindgrasp_shared::device::{Device, Inputs, Reading};
+use blindgrasp_shared::fault::{Fault, Raised};
+use blindgrasp_shared::identity::{Clock, Crash, CrashKind, Identity, Image, ResetCause, UNITS};
+use blindgrasp_shared::link::message::Reply;
+use blindgrasp_shared::link::{Receiver, encode, most_bytes};
+use blindgrasp_shared::settings::Parameter;
+use blindgrasp_shared::supervisor::Mode;
+use blindgrasp_shared::telemetry::INTERFACE_VERSION;
+use blindgrasp_shared::tick::Params;
+use serde::Serialize;
+use std::collections::VecDeque;
+use std::time::{Duration, Instant};
+
+/// A board with the image `hand` whose joints stand still in the hand's nominal posture.
+struct Board {
+    device: Device<MAX_JOINTS, MAX_FINGERS>,
+    receiver: Receiver<512>,
+    waiting: VecDeque<Packet>,
+    reading: Reading<MAX_JOINTS>,
+    mode: Mode,
+    fault: Option<Raised>,
+    heartbeats: usize,
+}
+
+impl Board {
+    fn new() -> Self {
+        Self::with_version(INTERFACE_VERSION)
+    }
+
+    fn with_version(interface_version: u16) -> Self {
+        let hand = HandModel::load("three-finger").expect("the hand");
+        let image = Image {
+            interface_version,
+            kind: "hand",
+            hand: "three-finger",
+            hand_hash: hand.hash(),
+            firmware_version: "0.0.1",
+            build_hash: 1,
+            joint_count: hand.hand.joint_count() as u8,
+            fingertip_count: hand.hand.fingertip_count() as u8,
+            period_us: hand.config.period_us,
+        };
+        let crash = Crash {
+            kind: CrashKind::HardFault,
+            program_counter: 0x0800_1234,
+            link_register: 0x0800_4321,
+            line: 0,
+            file_hash: 0,
+        };
+        let clock = Clock::External;
+        let identity = Identity { image, units: UNITS, clock, reset: ResetCause::Pin, crash: Some(crash) };
+        // A finger: abduction, and three knuckles that bend.
+        let mut counts = [0; MAX_JOINTS];
+        for (k, count) in counts.iter_mut().enumerate().take(hand.hand.joint_count()) {
+            let angle_rad = [0.0, -0.45, 0.75, 0.75][k % 4];
+            *count = (angle_rad / hand.config.estimator.encoders[k].rad_per_count) as i32;
+        }
+        Self {
+            device: Device::new(Params::new(hand.hand.cast(), &hand.config).expect("parameters"), identity),
+            receiver: Receiver::new(),
+            waiting: VecDeque::new(),
+            reading: Reading::Counts(counts),
+            mode: Mode::Disarmed,
+            fault: None,
+            heartbeats: 0,
+        }
+    }
+
+    fn take(&mut self, bytes: &[u8]) {
+        for &byte in bytes {
+            if let Some(Ok(payload)) = self.receiver.push(byte) {
+                let packet = Packet::decode(payload).expect("a request");
+                self.heartbeats += usize::from(packet.request == Request::Heartbeat);
+                self.waiting.push_back(packet);
+            }
+        }
+    }
+
+    /// A tick; returns what it says.
+    fn tick(&mut self) -> Vec<u8> {
+        let packet = self.waiting.pop_front();
+        let reading = self.reading;
+        let outputs = self.device.tick(&Inputs { reading, late: false, cycles: 7, dropped: 0, packet });
+        (self.mode, self.fault) = (outputs.record.mode, outputs.record.fault);
+        let mut said = Vec::new();
+        if let Some(reply) = outputs.reply {
+            said.extend(frame(&reply));
+        }
+        if let Some(signals) = outputs.telemetry {
+            let mut record = outputs.record;
+            record.keep(signals);
+            said.extend(frame(&Reply::Record(record)));
+        }
+        said
+    }
+}
+
+fn frame(message: &impl Serialize) -> Vec<u8> {
+    let mut buffer = [0; most_bytes(Reply::<MAX_JOINTS>::MOST_BYTES)];
+    encode(message, &mut buffer).expect("room").to_vec()
+}
+
+/// A talk and a board, a millisecond at a time.
+struct Bench {
+    talk: Talk,
+    board: Board,
+    now: Instant,
+    events: Vec<Event>,
+}
+
+impl Bench {
+    fn new() -> Self {
+        let now = Instant::now();
+        Self { talk: Talk::new(PATIENCE, now), board: Board::new(), now, events: Vec::new() }
+    }
+
+    /// With a session, and nothing to tell.
+    fn open() -> Self {
+        let mut bench = Self::new();
+        bench.run(300).expect("a session");
+        assert!(bench.talk.is_idle());
+        bench.events.clear();
+        bench
+    }
+
+    fn run(&mut self, milliseconds: u32) -> Result<(), TalkError> {
+        self.run_with(milliseconds, |board, bytes| {
+            board.take(bytes);
+            board.tick()
+        })
+    }
+
+    /// With another way from the host's bytes of a millisecond to the board's.
+    fn run_with(
+        &mut self,
+        milliseconds: u32,
+        mut way: impl FnMut(&mut Board, &[u8]) -> Vec<u8>,
+    ) -> Result<(), TalkError> {
+        for _ in 0..milliseconds {
+            self.talk.turn(self.now)?;
+            let said = way(&mut self.board, &self.talk.outgoing());
+            self.talk.take(&said, self.now)?;
+            self.events.extend(std::iter::from_fn(|| self.talk.event()));
+            self.now += Duration::from_millis(1);
+        }
+        Ok(())
+    }
+
+    fn command(&mut self, command: Command) {
+        self.talk.ask(Request::Command(command), self.now);
+    }
+
+    fn has_seen(&self, event: &Event) -> bool {
+        self.events.contains(event)
+    }
+}
+
+fn done(command: Command) -> Event {
+    Event::Answer(Request::Command(command), Answer::Done)
+}
+
+#[test]
+fn the_heartbeat_is_kept_and_without_it_the_hand_lets_go() {
+    let mut bench = Bench::open();
+    bench.command(Command::Arm);
+    bench.board.heartbeats = 0;
+    bench.run(3000).unwrap();
+    assert!(bench.has_seen(&done(Command::Arm)) && bench.has_seen(&Event::Mode(Mode::Armed)));
+    assert_eq!(bench.board.mode, Mode::Armed);
+    // Three in the 250 ms that they may fail.
+    assert!((34..=38).contains(&bench.board.heartbeats), "{}", bench.board.heartbeats);
+    for _ in 0..3000 {
+        bench.board.tick();
+    }
+    assert_eq!((bench.board.mode, bench.board.fault), (Mode::Fault, Some(Raised::of_hand(Fault::LinkLost))));
+}
+
+#[test]
+fn a_heartbeat_that_is_set_is_kept_from_then_on() {
+    let mut bench = Bench::open();
+    let parameter = Parameter::HeartbeatTime;
+    bench.talk.ask(Request::SetParameter { parameter, index: 0, value: 30.0 }, bench.now);
+    bench.run(100).unwrap();
+    bench.command(Command::Arm);
+    bench.run(1000).unwrap();
+    assert_eq!(bench.board.mode, Mode::Armed);
+}
+
+#[test]
+fn faults_and_modes_are_told_when_they_happen_and_once() {
+    let mut bench = Bench::open();
+    bench.command(Command::Arm);
+    bench.run(200).unwrap();
+    bench.events.clear();
+    let raised = Raised::at(3, Fault::SampleMissing);
+    let counts = bench.board.reading;
+    bench.board.reading = Reading::Failed(raised);
+    bench.run(500).unwrap();
+    let told = |event: &Event| !matches!(event, Event::Record(_));
+    bench.events.retain(told);
+    assert_eq!(bench.events, [Event::Mode(Mode::Fault), Event::Fault(Some(raised))]);
+    bench.board.reading = counts;
+    bench.command(Command::ClearFault);
+    bench.run(200).unwrap();
+    bench.events.retain(told);
+    let after = [done(Command::ClearFault), Event::Mode(Mode::Disarmed), Event::Fault(None)];
+    assert_eq!(bench.events[2..], after);
+}
+
+#[test]
+fn a_few_requests_are_asked_at_a_time_and_a_stop_overtakes() {
+    let mut bench = Bench::open();
+    let gets: Vec<Request> =
+        (0..9).map(|index| Request::GetParameter { parameter: Parameter::Damping, index }).collect();
+    for request in &gets {
+        bench.talk.ask(request.clone(), bench.now);
+    }
+    let mut sent = 0;
+    bench
+        .run_with(200, |board, bytes| {
+            board.take(bytes);
+            sent = board.waiting.iter().filter(|packet| packet.request != Request::Heartbeat).count();
+            let other: Reply<'_, MAX_JOINTS> = Reply::Answer { sequence: 0, refused: None };
+            frame(&other)
+        })
+        .unwrap();
+    assert_eq!(sent, 4);
+    bench.command(Command::Stop);
+    bench.run(200).unwrap();
+    let told: Vec<&Event> = bench.events.iter().filter(|event| !matches!(event, Event::Record(_))).collect();
+    let answered =
+        |event: &&Event| matches!(event, Event::Answer(Request::GetParameter { .. }, Answer::Value(_)));
+    assert_eq!(told.iter().filter(|event| answered(event)).count(), 4);
+    for request in &gets[4..] {
+        assert!(bench.has_seen(&Event::Unsent(request.clone())));
+    }
+    assert!(bench.has_seen(&done(Command::Stop)) && bench.talk.is_idle());
+}
+
+#[test]
+fn what_gets_lost_is_told_but_a_stop_is_sent_again() {
+    let mut bench = Bench::open();
+    bench.command(Command::Arm);
+    bench.run(100).unwrap();
+    bench.events.clear();
+    bench.talk.ask(Request::GetParameter { parameter: Parameter::Force, index: 0 }, bench.now);
+    bench.command(Command::Stop);
+    // A byte of everything that is sent in this millisecond is another.
+    bench
+        .run_with(1, |board, bytes| {
+            let mut bytes = bytes.to_vec();
+            bytes.iter_mut().for_each(|byte| *byte = if *byte == 0 { 0 } else { *byte ^ 0x40 | 1 });
+            board.take(&bytes);
+            board.tick()
+        })
+        .unwrap();
+    bench.run(150).unwrap();
+    assert!(bench.has_seen(&done(Command::Stop)));
+    assert_eq!(bench.board.mode, Mode::Disarmed);
+    bench.run(1000).unwrap();
+    let request = Request::GetParameter { parameter: Parameter::Force, index: 0 };
+    assert!(bench.has_seen(&Event::Unanswered(request)));
+}
+
+#[test]
+fn a_board_that_was_reset_is_greeted_again() {
+    let mut bench = Bench::open();
+    bench.board = Board::new();
+    bench.command(Command::Arm);
+    bench.run(300).unwrap();
+    let refused = Answer::Refused(Refusal::NoSession);
+    assert!(bench.has_seen(&Event::Answer(Request::Command(Command::Arm), refused)));
+    let at = |wanted: fn(&Event) -> bool| bench.events.iter().position(wanted).expect("the event");
+    assert!(at(|event| *event == Event::StartedAnew) < at(|event| matches!(event, Event::Open { .. })));
+    bench.command(Command::Arm);
+    bench.run(1000).unwrap();
+    assert_eq!(bench.board.mode, Mode::Armed);
+}
+
+#[test]
+fn damaged_frames_are_counted_and_silence_is_noticed() {
+    let mut bench = Bench::open();
+    bench
+        .run_with(1, |board, bytes| {
+            [vec![3, 3, 0, 9, 9, 9, 0], {
+                board.take(bytes);
+                board.tick()
+            }]
+            .concat()
+        })
+        .unwrap();
+    bench.run(100).unwrap();
+    assert_eq!(bench.talk.traffic().frames_damaged, 2);
+    let begun = bench.now;
+    let error = bench.run_with(5000, |_, _| Vec::new()).unwrap_err();
+    assert!(matches!(error, TalkError::Silence(..)), "{error}");
+    assert!(bench.now - begun <= PATIENCE.answer, "{:?}", bench.now - begun);
+}
+
+#[test]
+fn nobody_there_is_told_in_time_and_garbage_as_such() {
+    let mut bench = Bench::new();
+    let mut hellos = 0;
+    let error = bench
+        .run_with(5000, |_, bytes| {
+            hellos += usize::from(bytes.first() == Some(&0));
+            Vec::new()
+        })
+        .unwrap_err();
+    assert_eq!(hellos, 6);
+    assert!(!error.to_string().contains("garbage"), "{error}");
+    let mut bench = Bench::new();
+    let error = bench.run_with(5000, |_, _| b"U-Boot 2021.04\r\n\0".to_vec()).unwrap_err();
+    assert!(error.to_string().starts_with("nothing answers within 3 s but garbage (51000 bytes "), "{error}");
+}
+
+#[test]
+fn another_interface_version_is_told_whether_the_rest_can_be_read_or_not() {
+    let mut bench = Bench::new();
+    bench.board = Board::with_version(7);
+    assert_eq!(bench.run(100), Err(TalkError::OtherInterface { theirs: 7 }));
+    let mut bench = Bench::new();
+    let unknown = |_: &mut Board, _: &[u8]| frame(&(0_u8, 1_u16, 1_u16, 9_u16, "and then nobody knows"));
+    assert_eq!(bench.run_with(100, unknown), Err(TalkError::OtherInterface { theirs: 9 }));
+}
+
+#[cfg(unix)]
+mod command {
+    use super::*;
+    use nix::sys::signal::{Signal, kill};
+    use nix::unistd::Pid;
+    use std::io::{BufRead as _, BufReader, ErrorKind, Read as _, Write as _};
+    use std::os::unix::net::{UnixListener, UnixStream};
+    use std::process::{Child, Output, Stdio};
+    use std::sync::mpsc;
+    use std::thread;
+    use tempfile::TempDir;
+
+    /// The command, at a socket behind which this runs.
+    fn start(behind: impl FnOnce(UnixStream) + Send + 'static) -> (Child, TempDir) {
+        let folder = TempDir::new().expect("a folder");
+        let path = folder.path().join("hand");
+        let listener = UnixListener::bind(&path).expect("a socket");
+        thread::spawn(move || behind(listener.accept().expect("the command connects").0));
+        let child = std::process::Command::new(env!("CARGO_BIN_EXE_blindgrasp"))
+            .args(["console", "--port", &format!("unix:{}", path.display())])
+            .stdin(Stdio::piped())
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped())
+            .spawn()
+            .expect("the command starts");
+        (child, folder)
+    }
+
+    /// Runs a board as fast as the clock does, for so long or until the host hangs up.
+    fn serve(mut board: Board, mut socket: UnixStream, time: Duration) -> Board {
+        socket.set_read_timeout(Some(Duration::from_millis(1))).expect("a timeout");
+        let begun = Instant::now();
+        let mut ticks = 0;
+        let mut bytes = [0; 512];
+        while begun.elapsed() < time {
+            match socket.read(&mut bytes) {
+                Ok(count @ 1..) => board.take(&bytes[..count]),
+                Err(error) if matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut) => {}
+                Ok(0) | Err(_) => {
+                    // What was said last counts, too.
+                    while !board.waiting.is_empty() {
+                        board.tick();
+                    }
+                    break;
+                }
+            }
+            while ticks < begun.elapsed().as_millis() {
+                ticks += 1;
+                // Whether the host has hung up, the reading tells.
+                let _ = socket.write_all(&board.tick());
+            }
+        }
+        board
+    }
+
+    fn type_all(board: Board, script: &str) -> (Output, String, String) {
+        let (mut child, _folder) = start(|socket| drop(serve(board, socket, Duration::from_secs(60))));
+        child.stdin.take().expect("stdin").write_all(script.as_bytes()).expect("the script is taken");
+        ended(child)
+    }
+
+    fn ended(child: Child) -> (Output, String, String) {
+        let output = child.wait_with_output().expect("the command ends");
+        let text = |bytes: &[u8]| String::from_utf8(bytes.to_vec()).expect("UTF-8");
+        let (said, errors) = (text(&output.stdout), text(&output.stderr));
+        (output, said, errors)
+    }
+
+    /// Asserts that these lines are there in this order, each the beginning of one.
+    fn assert_lines(said: &str, wanted: &[&str]) {
+        let mut lines = said.lines();
+        for wanted in wanted {
+            assert!(lines.any(|line| line.starts_with(wanted)), "no `{wanted}`, or not there, in:\n{said}");
+        }
+    }
+
+    #[test]
+    fn a_script_arms_grasps_releases_and_stops() {
+        let (output, said, errors) = type_all(Board::new(), "arm\ngrasp 0.5 0.002\nstatus\nrelease\nstop\n");
+        assert_eq!((output.status.code(), errors.as_str()), (Some(0), ""), "{said}");
+        let first = [
+            "blindgrasp 0.0.1 (00000001), image `hand` for the hand `three-finger`",
+            "clock: crystal; started by: reset pin",
+        ];
+        assert_lines(&said, &first);
+        assert_lines(&said, &["last crash: hard fault at 0x08001234"]);
+        assert_lines(
+            &said,
+            &["arm: done", "grasp: done", "mode       grasping", "release: done", "stop: done", "stop: done"],
+        );
+        assert_lines(
+            &said,
+            &["fault      none", "link  ", "joint name ", "0     finger-1-abduct ", "3     finger-1-flex-3 "],
+        );
+        let row = said.lines().find(|line| line.starts_with("1     finger-1-flex-1 ")).expect("a row");
+        assert!(row.contains(" -0.450 "), "{row}");
+    }
+
+    #[test]
+    fn refusals_and_mistakes_are_told_in_words() {
+        let script = "graps\ngrasp\nset limits.torque_nm 0.05\nget limits.torque_nm 3\nget force_m\nset force_n x\n\
+            get damping_nm_s 200\narm\nset force_n 1\nset\nwatch 1\n";
+        let (output, said, errors) = type_all(Board::new(), script);
+        assert_eq!(output.status.code(), Some(0));
+        let lines = [
+            "grasp: refused, the hand is disarmed: arm it first",
+            "limits.torque_nm[0] = 0.05: done",
+            "limits.torque_nm[11] = 0.05: done",
+            "limits.torque_nm[3] = 0.05  (Largest torque of a joint, N m)",
+            "damping_nm_s[200]: refused, this hand has no parameter with this index",
+            "arm: done",
+            "force_n = 1: refused, parameters are set while the hand is disarmed",
+            "stop: done",
+        ];
+        assert_lines(&said, &lines);
+        let wanted = [
+            "blindgrasp: `graps` is no command: did you mean `grasp`?",
+            "blindgrasp: `force_m` is no parameter: did you mean `force_n`?",
+            "blindgrasp: `x` is not a number",
+            "blindgrasp: use: set KEY [INDEX] VALUE: ",
+            "blindgrasp: watch: `1` is neither `off` nor whole milliseconds",
+        ];
+        assert_lines(&errors, &wanted);
+        assert_eq!(errors.lines().count(), wanted.len(), "{errors}");
+    }
+
+    #[test]
+    fn every_parameter_is_shown() {
+        let (output, said, _) = type_all(Board::new(), "get\nhelp\n");
+        assert_eq!(output.status.code(), Some(0));
+        for parameter in Parameter::ALL {
+            assert!(said.lines().any(|line| line.starts_with(parameter.key())), "{parameter}:\n{said}");
+        }
+        assert_lines(&said, &["gravity_m_s2[2] = -9.8", "help ", "quit ", "stop: done"]);
+    }
+
+    #[test]
+    fn a_fault_is_told_with_its_remedy_and_is_not_cleared_while_its_cause_is_there() {
+        let mut board = Board::new();
+        board.reading = Reading::Failed(Raised::at(0, Fault::SampleMissing));
+        let (output, said, _) = type_all(board, "status\narm\nclear\n");
+        assert_eq!(output.status.code(), Some(0));
+        let fault = "fault 1: joint 0: encoder gave no sample; check the encoder's wiring and supply";
+        assert_lines(
+            &said,
+            &[
+                fault,
+                "arm: refused, the hand is in a fault",
+                "clear fault: refused, the cause of the fault is still",
+            ],
+        );
+        assert_lines(&said, &["joints     not read: fault 1: joint 0"]);
+    }
+
+    #[test]
+    fn one_interrupt_stops_and_the_second_ends() {
+        let (mut child, _folder) = start(|socket| drop(serve(Board::new(), socket, Duration::from_secs(60))));
+        let mut stdin = child.stdin.take().expect("stdin");
+        stdin.write_all(b"watch 20\narm\n").expect("the script is taken");
+        let mut said = BufReader::new(child.stdout.take().expect("stdout")).lines().map_while(Result::ok);
+        let is_watched = |line: String| line.contains(" armed angles_rad ") && line.contains(" torques_nm ");
+        assert!(said.any(is_watched), "no line of watch");
+        let id = Pid::from_raw(child.id() as i32);
+        kill(id, Signal::SIGINT).expect("a signal");
+        assert!(said.any(|line| line == "stop: done") && said.any(|line| line == "mode: disarmed"));
+        kill(id, Signal::SIGINT).expect("a signal");
+        assert!(said.any(|line| line == "stop: done"));
+        assert_eq!(child.wait().expect("the command ends").code(), Some(0));
+    }
+
+    #[test]
+    fn the_hand_is_stopped_whatever_ends_the_command() {
+        let (at_the_end, ended) = mpsc::channel();
+        let (mut child, _folder) = start(move |socket| {
+            let board = serve(Board::new(), socket, Duration::from_secs(60));
+            let _ = at_the_end.send((board.mode, board.fault));
+        });
+        let mut stdin = child.stdin.take().expect("stdin");
+        stdin.write_all(b"watch 20\narm\n").expect("the script is taken");
+        let mut said = BufReader::new(child.stdout.take().expect("stdout")).lines().map_while(Result::ok);
+        assert!(said.any(|line| line == "mode: armed"));
+        // The next line of `watch` can't be printed.
+        drop(said);
+        assert_eq!(child.wait().expect("the command ends").code(), Some(2));
+        assert_eq!(ended.recv(), Ok((Mode::Disarmed, None)));
+    }
+
+    #[test]
+    fn a_script_does_not_go_on_after_a_reset() {
+        let (mut child, _folder) = start(|socket| {
+            let same = socket.try_clone().expect("a socket");
+            drop(serve(Board::new(), socket, Duration::from_millis(700)));
+            drop(serve(Board::new(), same, Duration::from_secs(60)));
+        });
+        let mut stdin = child.stdin.take().expect("stdin");
+        stdin.write_all(b"arm\n").expect("the script is taken");
+        let (output, said, errors) = ended(child);
+        assert_eq!(output.status.code(), Some(2));
+        assert_lines(&said, &["mode: armed", "the device was reset: "]);
+        assert!(errors.contains("the device was reset, which ends a script"), "{errors}");
+    }
+
+    #[test]
+    fn a_line_that_is_lost_ends_the_command() {
+        let (mut child, _folder) =
+            start(|socket| drop(serve(Board::new(), socket, Duration::from_millis(700))));
+        let _kept_open = child.stdin.take();
+        let (output, said, errors) = ended(child);
+        assert_eq!(output.status.code(), Some(2));
+        assert!(
+            said.contains("mode: disarmed") && errors.contains("the line is lost: the device hung up"),
+            "{errors}"
+        );
+    }
+
+    #[test]
+    fn a_port_where_nobody_answers_is_told() {
+        let (mut child, _folder) =
+            start(|mut socket| while socket.read(&mut [0; 64]).is_ok_and(|count| count > 0) {});
+        let _kept_open = child.stdin.take();
+        let (output, said, errors) = ended(child);
+        assert_eq!((output.status.code(), said.as_str()), (Some(2), ""));
+        assert!(
+            errors.contains("nothing answers within 3 s: check ") && errors.contains("; this machine has "),
+            "{errors}"
+        );
+        let nowhere = std::process::Command::new(env!("CARGO_BIN_EXE_blindgrasp"))
+            .args(["console", "--port", "unix:/no/such/socket"])
+            .output()
+            .expect("the command starts");
+        assert_eq!(nowhere.status.code(), Some(2));
+        assert!(
+            String::from_utf8_lossy(&nowhere.stderr).contains("cannot connect to the socket /no/such/socket")
+        );
+    }
+}
