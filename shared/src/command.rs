@@ -98,7 +98,7 @@ refusals! {
     FallbackClock      = "the crystal did not start, so that the tick has no exact time: repair the board";
     NotFinite          = "a value is not a finite number";
     OutOfRange         = "a value is out of its range: the limits are parameters";
-    NotDisarmed        = "parameters are set while the hand is disarmed: disarm it first";
+    NotDisarmed        = "parameters are set while the hand is disarmed: disarm it, or clear its fault, first";
     NoSuchParameter    = "this hand has no parameter with this index";
     SwitchedOff        = "this limit is switched off in the hand's configuration";
     NoSession          = "there is no session of this number: say hello first";

@@ -196,25 +196,37 @@ fn faults_of_counters_are_found_in_the_same_tick_as_on_the_host() {
         let counts = if joint % 2 == 0 { 1000 } else { -1000 };
         let jump = one(Kind::CounterJump { joint, counts });
         assert_eq!(finds(&scene, &jump, Raised::at(joint, Fault::CountJump)), 0);
-        // A counter that stands still is not believed once a neighbour has turned by 0.03 rad. In a grasp that holds it
-        // does not; so its counter jumps, by less than what is impossible.
+    }
+}
+
+/// Counters that stand still. They are not believed once a neighbour has turned by 0.1 rad and the torque changed by a
+/// twentieth of its limit. In a grasp that holds neither happens; so a neighbour's counter jumps, by less than what is
+/// impossible. Which joints' torques change enough is a matter of the grasp (`tests/faults.rs` measures that): here it has
+/// to be the same on both sides.
+#[test]
+fn frozen_counters_are_found_in_the_same_tick_as_on_the_host() {
+    const AT: u64 = 20;
+    let scene = scene("cube", 250, &[]);
+    let mut found = 0;
+    for joint in 0..JOINTS {
         let neighbour = if joint % 4 == 3 { joint - 1 } else { joint + 1 };
         let frozen = [
             Injection { at_tick: AT, kind: Kind::CounterFrozen { joint } },
-            Injection { at_tick: AT + 5, kind: Kind::CounterJump { joint: neighbour, counts: -400 } },
+            Injection { at_tick: AT + 5, kind: Kind::CounterJump { joint: neighbour, counts: -800 } },
         ];
-        if joint == 0 {
-            // The cube and the hand are the same on both sides of this finger: nothing turns it sideways, its torque
-            // stays what it was, and a counter that stands still is right.
-            let looped = looped(&scene, piped(DEFAULT_HAND), &frozen);
-            assert_eq!((looped.bits_differ, looped.run.first_fault), (0, None), "{}", looped.compared);
-            assert_same(&looped.run, &twin(&scene, &frozen));
+        let looped = looped(&scene, piped(DEFAULT_HAND), &frozen);
+        assert_eq!(looped.bits_differ, 0, "joint {joint}: {}", looped.compared);
+        assert_same(&looped.run, &twin(&scene, &frozen));
+        let Some((tick, raised)) = looped.run.first_fault else {
+            println!("joint {joint}: its frozen counter is not found");
             continue;
-        }
-        let ticks = finds(&scene, &frozen, Raised::at(joint, Fault::CounterFrozen));
-        println!("joint {joint}: frozen counter found after {ticks} ticks");
-        assert!(ticks >= 40, "{ticks}");
+        };
+        println!("joint {joint}: {raised}, {} ticks after its counter froze", tick - AT);
+        assert_eq!(raised.fault, Fault::CounterFrozen);
+        has_no_torque(&looped.run, 0);
+        found += 1;
     }
+    assert!(found >= JOINTS / 2, "{found}");
 }
 
 /// The faults of the link and of the time.
@@ -278,7 +290,7 @@ fn values_that_are_no_good_are_refused_by_name() {
         (set(Parameter::HeartbeatTime, 0, 0.5), Some(Refusal::OutOfRange)),
         (set(Parameter::Damping, 12, 1e-3), Some(Refusal::NoSuchParameter)),
         (set(Parameter::Force, 1, 1.0), Some(Refusal::NoSuchParameter)),
-        (set(Parameter::SlewLimit, 0, 1.0), Some(Refusal::SwitchedOff)),
+        (set(Parameter::SlewLimit, 0, -1.0), Some(Refusal::OutOfRange)),
         (Request::Command(Command::Grasp(Grasp::CONFIGURED)), Some(Refusal::NotArmed)),
         (Request::Command(Command::Release), Some(Refusal::NotGrasping)),
         (Request::Command(Command::ClearFault), Some(Refusal::NoFault)),
