@@ -160,7 +160,6 @@ fn what_it_does_not_take_it_refuses_by_name() {
         (get(Parameter::Force, 1), Refusal::NoSuchParameter),
         (get(Parameter::TorqueLimit, 12), Refusal::NoSuchParameter),
         (get(Parameter::Gravity, 3), Refusal::NoSuchParameter),
-        (get(Parameter::SlewLimit, 0), Refusal::SwitchedOff),
         // A hand in a fault is not disarmed.
         (set(Parameter::Force, 0, 1.0), Refusal::NotDisarmed),
         (set(Parameter::Force, 0, f32::NAN), Refusal::NotDisarmed),
