@@ -664,7 +664,7 @@ class Session:
         self.number, self.sequence, self.identity = 0, 0, None
         self.waiting = set()  # numbers of heartbeats without an answer
         self.next_heartbeat = None
-        self.records, self.lost, self.unusable, self.malformed = 0, 0, 0, 0
+        self.records, self.dense, self.lost, self.unusable, self.malformed = 0, 0, 0, 0, 0
         self.last_record, self.snapshots, self.parts = None, 0, {}
         line.write(b"\0")  # ends whatever is on the line
 
@@ -679,7 +679,8 @@ class Session:
         heard = []
         for payload in self.frames.push(self.line.read(patience_s)):
             try:
-                reply, _ = self.replies.decode(payload)
+                reply, digest = self.replies.decode(payload)
+                self.dense += digest is not None
             except Unusable:
                 self.unusable += 1
                 continue
@@ -787,6 +788,7 @@ class Session:
     def counted(self):
         return {
             "records": self.records,
+            "dense": self.dense,
             "lost": self.lost,
             "unusable": self.unusable,
             "damaged": self.frames.damaged,
