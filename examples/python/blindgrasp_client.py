@@ -994,10 +994,11 @@ def run_grasp(session, args):
         if not session.pump(10.0, lambda: state() in ("Armed", "Fault")) or state() == "Fault":
             raise Trouble("the release does not end as it should")
         session.command("Disarm")
-        session.telemetry(0, 0)
     except BaseException:
         session.command("Stop")
         raise
+    finally:
+        session.telemetry(0, 0)
 
 
 def run_burst(session, printer):

@@ -56,7 +56,8 @@ fn read_on(mut pipe: impl std::io::Read + Send + 'static) -> thread::JoinHandle<
 /// Its exit code, and what it said on the standard output and the standard error.
 fn said(arguments: &[&str]) -> (Option<i32>, String, String) {
     let output = client(arguments);
-    let [out, err] = [&output.stdout, &output.stderr].map(|bytes| String::from_utf8_lossy(bytes).into_owned());
+    let [out, err] =
+        [&output.stdout, &output.stderr].map(|bytes| String::from_utf8_lossy(bytes).into_owned());
     (output.status.code(), out, err)
 }
 
@@ -82,9 +83,9 @@ fn its_self_test_can_fail() {
     let vectors = fs::read_to_string(root().join(VECTORS)).expect("the vectors are there");
     // One character of each kind of vector.
     let changes = [
-        ("\"payload\":\"0100", "\"payload\":\"0200"),
+        ("\"payload\":\"01b424", "\"payload\":\"02b424"),
         ("\"why\":\"TooShort\"", "\"why\":\"BadCrc\""),
-        ("\"digest\":", "\"digest\":1"),
+        ("\"digest\":null", "\"digest\":7"),
         ("\"heard\":\"Lost\"", "\"heard\":\"NoFullRecord\""),
         ("\"interface_version\": 3", "\"interface_version\": 2"),
     ];
@@ -129,6 +130,10 @@ mod emulated {
     use std::path::Path;
     use std::process::Child;
     use tempfile::TempDir;
+
+    /// A clock that follows the instructions, 16 ns each, and not the time here: on a busy machine the firmware would
+    /// otherwise have to make up for ticks, and its queue would be full.
+    const STEADY: &str = "-icount shift=4,sleep=off";
 
     /// An image in QEMU, with its serial port as a socket. It is gone with this value, and with this process.
     struct Emulated {
@@ -185,7 +190,8 @@ mod emulated {
         println!("{result}");
         let modes = ["Disarmed", "Armed", "Grasping", "Releasing", "Armed", "Disarmed"];
         assert_eq!(result["modes"], serde_json::json!(modes));
-        assert_eq!((&result["ticks"], &result["records"]), (&1500.into(), &1500.into()));
+        // One more is that of the hello.
+        assert_eq!((&result["ticks"], &result["records"]), (&1500.into(), &1501.into()));
         for fine in ["lost", "unusable", "damaged", "malformed"] {
             assert_eq!(result[fine], 0, "{fine}");
         }
@@ -219,7 +225,7 @@ mod emulated {
 
     #[test]
     fn it_talks_to_the_hand() {
-        let emulated = Emulated::start(&kept_image("hand", DEFAULT_HAND), "");
+        let emulated = Emulated::start(&kept_image("hand", DEFAULT_HAND), STEADY);
         let port = emulated.port();
         let ask = |arguments: &[&str]| {
             let (command, rest) = arguments.split_first().expect("a command");
@@ -229,7 +235,10 @@ mod emulated {
         assert_eq!(code, Some(0), "{err}");
         let identity: serde_json::Value = serde_json::from_str(&out).expect("an object");
         let model = HandModel::load("three-finger").expect("it is built in");
-        assert_eq!((&identity["image"]["hand"], &identity["image"]["kind"]), (&"three-finger".into(), &"hand".into()));
+        assert_eq!(
+            (&identity["image"]["hand"], &identity["image"]["kind"]),
+            (&"three-finger".into(), &"hand".into())
+        );
         assert_eq!(identity["image"]["hand_hash"], model.hash());
         assert_eq!(identity["clock"], "Emulated");
 
@@ -253,14 +262,16 @@ mod emulated {
         assert_eq!(code, Some(1));
         assert!(err.contains("parameters are set while the hand is disarmed"), "{err}");
 
-        for arguments in [&["watch", "--seconds", "2", "--csv"][..], &["watch", "--seconds", "2", "--csv", "--full"]] {
+        for arguments in
+            [&["watch", "--seconds", "2", "--csv"][..], &["watch", "--seconds", "2", "--csv", "--full"]]
+        {
             let (code, out, err) = ask(arguments);
             assert_eq!(code, Some(0), "{err}");
             let counted = last(&err);
             println!("{arguments:?}: {counted}");
             let number = |key: &str| counted[key].as_u64().expect("a number");
-            // 2000 where this machine has the time for them.
-            assert!(number("records") >= 500, "{counted}");
+            // How many there are in 2 s depends on what else this machine does.
+            assert!(number("records") >= 200, "{counted}");
             for fine in ["lost", "unusable", "damaged", "malformed"] {
                 assert_eq!(number(fine), 0, "{fine}");
             }
@@ -280,7 +291,10 @@ mod emulated {
         let (code, out, err) = ask(&["burst", "--csv"]);
         assert_eq!(code, Some(0), "{err}");
         let modes: Vec<&str> = out.lines().skip(1).map(|line| line.split(',').nth(2).unwrap()).collect();
-        assert!(modes.len() >= 64 && modes[modes.len() - 64..].iter().all(|&mode| mode == "Fault"), "{modes:?}");
+        assert!(
+            modes.len() >= 64 && modes[modes.len() - 64..].iter().all(|&mode| mode == "Fault"),
+            "{modes:?}"
+        );
         assert!(modes[..modes.len() - 64].iter().all(|&mode| mode != "Fault"), "{modes:?}");
         assert_eq!(ask(&["stop"]).0, Some(0));
     }
