@@ -3,6 +3,8 @@
 pub(crate) mod console;
 pub(crate) mod flash;
 pub(crate) mod pil;
+#[cfg(unix)]
+pub(crate) mod serve;
 pub(crate) mod sim;
 
 /// How a command ended that was not misused.
