@@ -19,6 +19,8 @@ enum Command {
     Pil(commands::pil::Arguments),
     Flash(commands::flash::Arguments),
     Console(commands::console::Arguments),
+    Replay(commands::replay::Arguments),
+    Export(commands::export::Arguments),
 }
 
 fn main() -> ExitCode {
@@ -27,6 +29,8 @@ fn main() -> ExitCode {
         Command::Pil(arguments) => commands::pil::run(&arguments),
         Command::Flash(arguments) => commands::flash::run(&arguments),
         Command::Console(arguments) => commands::console::run(&arguments),
+        Command::Replay(arguments) => commands::replay::run(&arguments),
+        Command::Export(arguments) => commands::export::run(&arguments),
     };
     match outcome {
         Ok(commands::Outcome::Shown) => ExitCode::SUCCESS,
