@@ -26,10 +26,10 @@ pub(crate) enum Outcome {
 #[derive(Args)]
 pub(crate) struct Span {
     /// From this time on, s since the beginning of the recording
-    #[arg(long, value_name = "S", value_parser = seconds)]
+    #[arg(long, value_name = "S", value_parser = seconds, allow_negative_numbers = true)]
     from: Option<f64>,
     /// Up to this time, s since the beginning of the recording
-    #[arg(long, value_name = "S", value_parser = seconds)]
+    #[arg(long, value_name = "S", value_parser = seconds, allow_negative_numbers = true)]
     until: Option<f64>,
 }
 

@@ -308,6 +308,16 @@ impl Follower {
         {
             return self.step(&told);
         }
+        if let Progress::Waiting(pause) = &mut self.progress
+            && pause.reason == Reason::Start
+        {
+            // There may be another reason why it will not be known.
+            if !has_input(&told.record) {
+                pause.reason = Reason::NoCounts;
+            } else if decimation > 1 {
+                pause.reason = Reason::Decimated(decimation);
+            }
+        }
         self.pending.push_back(told);
         if self.pending.len() > PENDING {
             if matches!(self.progress, Progress::Running(_)) {
