@@ -224,6 +224,7 @@ mod tests {
             cycles: 0,
             late_ticks: 0,
             dropped: 0,
+            decimation: 1,
             counts: List::first_of([0; crate::MAX_JOINTS], 3),
             torques_nm: List::first_of(torques_nm, 3),
             limiting: List::default(),
@@ -268,7 +269,7 @@ mod tests {
         device.record.dropped = 1;
         assert_eq!(compare(&device, &host).bits_differ, 0);
         type Change = fn(&mut Turned);
-        let changes: [(&str, Change); 10] = [
+        let changes: [(&str, Change); 11] = [
             ("mode", |t| t.record.mode = Mode::Fault),
             ("fault", |t| t.record.fault = Some(Raised::of_hand(Fault::LinkLost))),
             ("answer to the command", |t| {
@@ -277,6 +278,7 @@ mod tests {
             }),
             ("reading", |t| t.record.reading_failed = Some(Raised::at(1, Fault::SampleMissing))),
             ("tick", |t| t.record.tick += 1),
+            ("decimation", |t| t.record.decimation = 2),
             ("sequence", |t| t.record.sequence += 1),
             ("counts", |t| t.record.counts = List::first_of([1; crate::MAX_JOINTS], 3)),
             ("number of torques", |t| t.record.torques_nm = List::default()),
