@@ -56,7 +56,7 @@ fn decoded(path: &Path) -> (u64, Vec<Decoded>) {
     let mut decoder = Decoder::new();
     let entries = recording.entries().unwrap().map(|entry| entry.unwrap());
     let decoded = entries.filter_map(|entry| decoder.take(&entry)).collect();
-    (recording.span().0.0, decoded)
+    (recording.span().unwrap().0.0, decoded)
 }
 
 fn joint_names() -> Vec<String> {

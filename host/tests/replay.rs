@@ -32,7 +32,7 @@ fn folder() -> (TempDir, PathBuf) {
 fn replayed_with(path: &Path, wanted: Wanted) -> Result<Report, ReplayError> {
     let recording = Recording::open(path).unwrap();
     let mut entries = recording.entries().unwrap();
-    replay(&mut entries, |_| {}, 0, "hand", recording.span().0.0, wanted)
+    replay(&mut entries, |_| {}, 0, "hand", recording.span().unwrap().0.0, wanted)
 }
 
 fn replayed(path: &Path) -> Report {

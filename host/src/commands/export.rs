@@ -1,6 +1,6 @@
 //! `blindgrasp export`: a recording as a table.
 
-use super::{Outcome, Span, chosen_device, reading_bar};
+use super::{Outcome, Span, chosen_device, damage_of, reading_bar, start_ns};
 use anyhow::{Context, bail};
 use blindgrasp::record::export::{ExportError, Exported, Format, Request, export};
 use blindgrasp::record::mcap::Recording;
@@ -61,7 +61,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
         signals: arguments.signals.clone(),
         from_s: arguments.span.from,
         until_s: arguments.span.until,
-        start_ns: recording.span().0.0,
+        start_ns: start_ns(&recording),
     };
     let path = arguments.out.clone().unwrap_or_else(|| arguments.file.with_extension(ending));
     let to: Box<dyn Write + Send> = if path == Path::new("-") {
@@ -71,7 +71,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
     };
     let mut entries = recording.entries()?;
     let bar = reading_bar(&arguments.file);
-    let exported = export(&mut entries, |entries| bar.set_position(entries.position()), &request, format, to);
+    let exported = export(&mut entries, |entries| bar.set_position(entries.position().0), &request, format, to);
     bar.finish_and_clear();
     let exported = match exported {
         Err(error) if is_broken_pipe(&error) => return Ok(Outcome::Shown),
@@ -79,11 +79,11 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
     };
     let Exported { rows, lost, gaps, ended } = exported;
     eprintln!("blindgrasp: {}: {rows} rows; {lost} records lost, {gaps} gaps", path.display());
-    let damage = entries.damage().map(|damage| damage.to_string());
-    for words in [&ended, &damage].into_iter().flatten() {
+    let is_whole = ended.is_none() && entries.damage().is_none();
+    for words in [ended, damage_of(&entries)].into_iter().flatten() {
         eprintln!("blindgrasp: {}: {words}", arguments.file.display());
     }
-    Ok(if ended.is_none() && damage.is_none() { Outcome::Shown } else { Outcome::Failed })
+    Ok(if is_whole { Outcome::Shown } else { Outcome::Failed })
 }
 
 fn create(path: &Path, force: bool) -> anyhow::Result<std::fs::File> {

@@ -8,7 +8,7 @@ pub(crate) mod replay;
 pub(crate) mod sim;
 
 use anyhow::{Context, bail};
-use blindgrasp::record::mcap::Recording;
+use blindgrasp::record::mcap::{Entries, Recording};
 use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 use std::path::Path;
@@ -62,6 +62,18 @@ fn chosen_device(recording: &Recording, wanted: Option<&str>) -> anyhow::Result<
         None if names.is_empty() => bail!("the recording is empty: it has no device"),
         None => bail!("the recording has several devices: choose one with --device: {}", names.join(", ")),
     }
+}
+
+/// When a recording begins, ns.
+fn start_ns(recording: &Recording) -> u64 {
+    recording.span().map_or(0, |(start, _)| start.0)
+}
+
+/// What is wrong with a recording that was read, in words.
+fn damage_of(entries: &Entries) -> Option<String> {
+    let damage = entries.damage();
+    let kind = if damage.is_none() { "not finished" } else { "damaged" };
+    (!damage.is_none() || damage.unfinished).then(|| format!("{kind}: {damage}"))
 }
 
 /// A bar over the bytes of a file; hidden where stderr is no terminal.

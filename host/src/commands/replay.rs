@@ -1,6 +1,6 @@
 //! `blindgrasp replay`: a recording through the controller again.
 
-use super::{Outcome, Span, chosen_device, reading_bar};
+use super::{Outcome, Span, chosen_device, damage_of, reading_bar, start_ns};
 use anyhow::Context;
 use blindgrasp::record::mcap::Recording;
 use blindgrasp::record::replay::{Change, Report, Wanted, replay};
@@ -71,15 +71,15 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
     let bar = reading_bar(&arguments.file);
     let replayed = replay(
         &mut entries,
-        |entries| bar.set_position(entries.position()),
+        |entries| bar.set_position(entries.position().0),
         device,
         &name,
-        recording.span().0.0,
+        start_ns(&recording),
         wanted,
     );
     bar.finish_and_clear();
     let mut report = replayed?;
-    report.damage = entries.damage().map(|damage| damage.to_string());
+    report.damage = damage_of(&entries);
     if let Some(damage) = &report.damage {
         eprintln!("blindgrasp: {}: {damage}", arguments.file.display());
     }

@@ -1,8 +1,10 @@
-//! What a run leaves behind: samples in memory, and files in a directory.
+//! What a run leaves behind: samples in memory, files in a directory, and recordings of hands.
 
 pub mod csv;
 #[cfg(feature = "command")]
 pub mod export;
+#[cfg(feature = "command")]
+pub mod mcap;
 #[cfg(feature = "command")]
 pub mod replay;
 pub mod run_dir;

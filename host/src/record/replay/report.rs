@@ -30,7 +30,7 @@ pub struct Report {
     pub gap_count: u64,
     /// What other parameters would have done.
     pub open_loop: Option<OpenLoop>,
-    /// Where the file is damaged: what came before was replayed.
+    /// What is wrong with the file; what could be read was replayed.
     pub damage: Option<String>,
 }
 
@@ -149,7 +149,7 @@ impl fmt::Display for Report {
             line("  gaps", &format_args!("{} more", self.gap_count - self.gaps.len() as u64))?;
         }
         if let Some(damage) = &self.damage {
-            line("DAMAGED", damage)?;
+            line("file", damage)?;
         }
         match &self.open_loop {
             Some(open_loop) => write!(f, "\n{open_loop}"),
