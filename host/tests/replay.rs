@@ -19,9 +19,8 @@ use std::path::{Path, PathBuf};
 use std::process::{Command as Process, Output};
 use tempfile::TempDir;
 
-/// Ticks from one snapshot to the next, and those that it takes to send one of a hand with 12 joints, with room.
+/// Ticks from one snapshot to the next.
 const SNAPSHOT_TICKS: u32 = 1000;
-const SENDING_TICKS: u32 = 120;
 
 fn folder() -> (TempDir, PathBuf) {
     let folder = tempfile::tempdir().unwrap();

@@ -71,7 +71,8 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
     };
     let mut entries = recording.entries()?;
     let bar = reading_bar(&arguments.file);
-    let exported = export(&mut entries, |entries| bar.set_position(entries.position().0), &request, format, to);
+    let exported =
+        export(&mut entries, |entries| bar.set_position(entries.position().0), &request, format, to);
     bar.finish_and_clear();
     let exported = match exported {
         Err(error) if is_broken_pipe(&error) => return Ok(Outcome::Shown),

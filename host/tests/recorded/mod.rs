@@ -16,17 +16,17 @@ use blindgrasp_shared::tick::{Config, Input, Params, State, tick};
 use std::f64::consts::TAU;
 use std::path::Path;
 
-pub type AnyRecord = Record<f32, MAX_JOINTS>;
-pub type AnyConfig = Config<f32, MAX_JOINTS>;
+pub(crate) type AnyRecord = Record<f32, MAX_JOINTS>;
+pub(crate) type AnyConfig = Config<f32, MAX_JOINTS>;
 
 /// Time of a tick, ns.
-pub const TICK_NS: u64 = 1_000_000;
+pub(crate) const TICK_NS: u64 = 1_000_000;
 /// When recordings begin, ns since 1970.
-pub const START_NS: u64 = 1_700_000_000_000_000_000;
+pub(crate) const START_NS: u64 = 1_700_000_000_000_000_000;
 
 /// What becomes of a record that a device sends.
 #[derive(Clone, Copy, PartialEq)]
-pub enum Fate {
+pub(crate) enum Fate {
     Arrives,
     IsLost,
     /// A bit of this torque's is another.
@@ -37,18 +37,18 @@ pub enum Fate {
 }
 
 /// The hand, and its joints' way through the time.
-pub struct Hand {
-    pub file: HandFile,
-    pub model: HandModel,
+pub(crate) struct Hand {
+    pub(crate) file: HandFile,
+    pub(crate) model: HandModel,
 }
 
 impl Hand {
-    pub fn load(name: &str) -> Self {
+    pub(crate) fn load(name: &str) -> Self {
         Self { file: HandFile::load(name).unwrap(), model: HandModel::load(name).unwrap() }
     }
 
     /// Counts of a tick: each joint swings slowly, about the middle of its range.
-    pub fn counts(&self, tick: u32) -> [i32; MAX_JOINTS] {
+    pub(crate) fn counts(&self, tick: u32) -> [i32; MAX_JOINTS] {
         std::array::from_fn(|k| {
             let Some(joint) = self.file.joints.get(k) else { return 0 };
             let [lower, upper] = joint.limits_rad;
@@ -61,9 +61,9 @@ impl Hand {
 }
 
 /// A device, its host, and the recording.
-pub struct Session {
-    pub hand: Hand,
-    pub writer: Writer,
+pub(crate) struct Session {
+    pub(crate) hand: Hand,
+    pub(crate) writer: Writer,
     recorded: Recorded,
     device: Device<MAX_JOINTS, MAX_FINGERS>,
     burst: Box<Burst<MAX_JOINTS>>,
@@ -73,13 +73,13 @@ pub struct Session {
     session: u16,
     sequence: u16,
     /// Ticks of all the device's lives.
-    pub time: u32,
+    pub(crate) time: u32,
     /// Ticks since its start.
-    pub tick: u32,
+    pub(crate) tick: u32,
     /// Records that the host could have taken down, and that it did.
-    pub sent: u64,
-    pub arrived: u64,
-    pub dropped: u32,
+    pub(crate) sent: u64,
+    pub(crate) arrived: u64,
+    pub(crate) dropped: u32,
 }
 
 fn device(model: &HandModel) -> Device<MAX_JOINTS, MAX_FINGERS> {
@@ -100,7 +100,7 @@ fn device(model: &HandModel) -> Device<MAX_JOINTS, MAX_FINGERS> {
 }
 
 /// What the device of a hand says of itself.
-pub fn about(hand: &Hand) -> About {
+pub(crate) fn about(hand: &Hand) -> About {
     let model = &hand.model;
     About {
         interface_version: INTERFACE_VERSION,
@@ -128,7 +128,7 @@ pub fn about(hand: &Hand) -> About {
 
 impl Session {
     /// A recording that begins with nobody's session.
-    pub fn new(path: &Path) -> Self {
+    pub(crate) fn new(path: &Path) -> Self {
         let hand = Hand::load("three-finger");
         let mut writer = Writer::create(path, false).unwrap();
         let recorded = writer.add_device("hand");
@@ -152,17 +152,17 @@ impl Session {
     }
 
     /// When the present tick is.
-    pub fn now(&self) -> Stamp {
+    pub(crate) fn now(&self) -> Stamp {
         Stamp(START_NS + u64::from(self.time) * TICK_NS)
     }
 
     /// A tick in which nothing happens.
-    pub fn pass(&mut self) -> AnyRecord {
+    pub(crate) fn pass(&mut self) -> AnyRecord {
         self.turn(None, Fate::Arrives)
     }
 
     /// Ticks with a heartbeat now and then.
-    pub fn run(&mut self, ticks: u32) {
+    pub(crate) fn run(&mut self, ticks: u32) {
         for k in 0..ticks {
             match k % 100 {
                 0 => self.turn(Some(Request::Heartbeat), Fate::Arrives),
@@ -171,20 +171,20 @@ impl Session {
         }
     }
 
-    pub fn command(&mut self, command: Command) -> AnyRecord {
+    pub(crate) fn command(&mut self, command: Command) -> AnyRecord {
         self.turn(Some(Request::Command(command)), Fate::Arrives)
     }
 
-    pub fn turn(&mut self, request: Option<Request<MAX_JOINTS>>, fate: Fate) -> AnyRecord {
+    pub(crate) fn turn(&mut self, request: Option<Request<MAX_JOINTS>>, fate: Fate) -> AnyRecord {
         let reading = Reading::Counts(self.hand.counts(self.time));
         self.turn_with(request, fate, reading, false)
     }
 
-    pub fn fail(&mut self, raised: Raised) -> AnyRecord {
+    pub(crate) fn fail(&mut self, raised: Raised) -> AnyRecord {
         self.turn_with(None, Fate::Arrives, Reading::Failed(raised), false)
     }
 
-    pub fn turn_with(
+    pub(crate) fn turn_with(
         &mut self,
         request: Option<Request<MAX_JOINTS>>,
         fate: Fate,
@@ -246,7 +246,7 @@ impl Session {
     }
 
     /// Says hello, and takes down who answers and its parameters.
-    pub fn hello(&mut self) {
+    pub(crate) fn hello(&mut self) {
         self.turn(Some(Request::Hello { interface_version: INTERFACE_VERSION }), Fate::Arrives);
         let about = about(&self.hand);
         self.writer.about(self.recorded, self.now(), &about).unwrap();
@@ -255,12 +255,12 @@ impl Session {
     }
 
     /// Asks for every record, with everything.
-    pub fn telemetry(&mut self, decimation: u16, signals: Signals) {
+    pub(crate) fn telemetry(&mut self, decimation: u16, signals: Signals) {
         self.turn(Some(Request::Telemetry { decimation, signals }), Fate::Arrives);
     }
 
     /// Sets a parameter, and takes it down if that was done.
-    pub fn set(&mut self, parameter: Parameter, index: u8, value: f32) {
+    pub(crate) fn set(&mut self, parameter: Parameter, index: u8, value: f32) {
         self.turn(Some(Request::SetParameter { parameter, index, value }), Fate::Arrives);
         let now = self.device.params().get(parameter, index).unwrap();
         let setting = Setting { parameter, index, value: Some(now) };
@@ -268,7 +268,7 @@ impl Session {
     }
 
     /// The device starts anew, and says nothing for a while.
-    pub fn restart(&mut self, ticks: u32) {
+    pub(crate) fn restart(&mut self, ticks: u32) {
         let (now, words) = (self.now(), "the port is gone");
         self.writer.gap(self.recorded, now, words).unwrap();
         self.device = device(&self.hand.model);
@@ -279,14 +279,14 @@ impl Session {
         }
     }
 
-    pub fn finish(self) -> Saved {
+    pub(crate) fn finish(self) -> Saved {
         self.writer.finish().unwrap()
     }
 }
 
 /// A recording of a controller alone, from its first tick on, as a simulation makes it. `each` gives the input of a tick
 /// and may change what is told of it; the last tick has been when it gives none.
-pub fn simulation(
+pub(crate) fn simulation(
     path: &Path,
     hand: &Hand,
     config: &AnyConfig,
@@ -326,7 +326,7 @@ pub fn simulation(
 }
 
 /// What a controller is told of its joints.
-pub enum Told {
+pub(crate) enum Told {
     Counts([i32; MAX_JOINTS]),
     Ideal,
 }
