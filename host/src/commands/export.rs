@@ -81,7 +81,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
     let Exported { rows, lost, gaps, ended } = exported;
     eprintln!("blindgrasp: {}: {rows} rows; {lost} records lost, {gaps} gaps", path.display());
     let is_whole = ended.is_none() && entries.damage().is_none();
-    for words in [ended, damage_of(&entries)].into_iter().flatten() {
+    for words in [ended, damage_of(&recording, &entries)].into_iter().flatten() {
         eprintln!("blindgrasp: {}: {words}", arguments.file.display());
     }
     Ok(if is_whole { Outcome::Shown } else { Outcome::Failed })

@@ -8,7 +8,7 @@ pub(crate) mod replay;
 pub(crate) mod sim;
 
 use anyhow::{Context, bail};
-use blindgrasp::record::mcap::{Entries, Recording};
+use blindgrasp::record::mcap::{Damage, Entries, Recording};
 use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 use std::path::Path;
@@ -69,11 +69,10 @@ fn start_ns(recording: &Recording) -> u64 {
     recording.span().map_or(0, |(start, _)| start.0)
 }
 
-/// What is wrong with a recording that was read, in words.
-fn damage_of(entries: &Entries) -> Option<String> {
-    let damage = entries.damage();
-    let kind = if damage.is_none() { "not finished" } else { "damaged" };
-    (!damage.is_none() || damage.unfinished).then(|| format!("{kind}: {damage}"))
+/// What is wrong with a recording as far as it was read, in words.
+fn damage_of(recording: &Recording, entries: &Entries) -> Option<String> {
+    let damage = Damage { unfinished: !recording.is_finished(), ..entries.damage().clone() };
+    (!damage.is_none() || damage.unfinished).then(|| damage.to_string())
 }
 
 /// A bar over the bytes of a file; hidden where stderr is no terminal.

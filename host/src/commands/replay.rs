@@ -79,7 +79,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
     );
     bar.finish_and_clear();
     let mut report = replayed?;
-    report.damage = damage_of(&entries);
+    report.damage = damage_of(&recording, &entries);
     if let Some(damage) = &report.damage {
         eprintln!("blindgrasp: {}: {damage}", arguments.file.display());
     }
