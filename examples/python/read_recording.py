@@ -12,10 +12,18 @@ import json
 import sys
 
 try:
+    from mcap.decoder import DecoderFactory
     from mcap.reader import make_reader
-    from mcap_protobuf.decoder import DecoderFactory
+    from mcap_protobuf.decoder import DecoderFactory as Protobuf
 except ImportError as error:
     sys.exit(f"{error}: pip install mcap mcap-protobuf-support")
+
+
+class Json(DecoderFactory):
+    """Decodes the channels of JSON, which the package leaves to its users."""
+
+    def decoder_for(self, message_encoding, schema):
+        return json.loads if message_encoding == "json" else None
 
 
 def signal_table(reader):
@@ -38,7 +46,7 @@ def main():
     with open(arguments.recording, "rb") as file:
         signals = signal_table(make_reader(file))
         file.seek(0)
-        reader = make_reader(file, decoder_factories=[DecoderFactory()])
+        reader = make_reader(file, decoder_factories=[Protobuf(), Json()])
         unit = signals.get(f"joints.<joint>.{arguments.signal}", {}).get("unit", "")
         topics = [f"/{arguments.device}/{what}" for what in ("about", "parameters", "event", "tick")]
         start_ns, records = None, 0
@@ -48,12 +56,10 @@ def main():
             at_s = (message.log_time - start_ns) * 1e-9
             what = channel.topic.rpartition("/")[2]
             if what == "about":
-                about = decoded if isinstance(decoded, dict) else json.loads(message.data)
-                print(f"{at_s:10.3f} s  hand {about['hand']} ({about['hand_hash']}), "
-                      f"firmware {about['firmware_version']}, joints: {', '.join(about['joint_names'])}")
+                print(f"{at_s:10.3f} s  hand {decoded['hand']} ({decoded['hand_hash']}), "
+                      f"firmware {decoded['firmware_version']}, joints: {', '.join(decoded['joint_names'])}")
             elif what == "parameters":
-                values = decoded if isinstance(decoded, dict) else json.loads(message.data)
-                print(f"{at_s:10.3f} s  {len(values['values'])} parameters")
+                print(f"{at_s:10.3f} s  {len(decoded['values'])} parameters")
             elif what == "event":
                 print(f"{at_s:10.3f} s  {decoded.name}: {decoded.message}")
             elif what == "tick":

@@ -1,6 +1,7 @@
 //! Recordings as tables: every row, every value, and what is missing.
 
-#[allow(dead_code)]
+#![allow(clippy::unwrap_used, reason = "only tests are here")]
+
 mod recorded;
 
 use blindgrasp::record::export::{Cell, Column};

@@ -1,6 +1,7 @@
 //! Recordings through the controller again: the same bits, what differs, and what can't be computed.
 
-#[allow(dead_code)]
+#![allow(clippy::unwrap_used, reason = "only tests are here")]
+
 mod recorded;
 
 use blindgrasp::MAX_JOINTS;
@@ -11,6 +12,7 @@ use blindgrasp_shared::device::Reading;
 use blindgrasp_shared::fault::{Fault, Raised};
 use blindgrasp_shared::limit::{Limit, LimitConfig};
 use blindgrasp_shared::link::message::Signals;
+use blindgrasp_shared::math::Real;
 use blindgrasp_shared::settings::Parameter;
 use blindgrasp_shared::supervisor::Mode;
 use blindgrasp_shared::tick::{Params, State};
@@ -95,7 +97,7 @@ fn a_whole_session_gives_the_same_bits() {
 
     let report = replayed(&path);
     assert_eq!(report.first_difference, None);
-    assert_eq!((report.bits_differ, report.lost), (0, 0));
+    assert_eq!((report.bits_differ, report.missing), (0, 0));
     // The tick that asks for records is the one after which the first snapshot is taken.
     assert_eq!((report.not_replayed, report.ticks), (1, sent - 1));
     assert_eq!(report.gaps.len(), 1);
@@ -123,17 +125,17 @@ fn lost_records_cost_no_more_than_up_to_the_next_snapshot() {
 
     let report = replayed(&path);
     assert_eq!((report.bits_differ, report.first_difference.clone()), (0, None));
-    assert_eq!(report.ticks + report.not_replayed + report.lost, sent);
+    assert_eq!(report.ticks + report.not_replayed + report.missing, sent);
     assert_eq!(
         report.gaps.iter().map(|gap| &gap.reason).collect::<Vec<_>>(),
         [&Reason::Start, &Reason::Lost, &Reason::Lost]
     );
-    assert_eq!(report.gaps[1].lost, 1);
+    assert_eq!(report.gaps[1].missing, 1);
     // Up to 100 dense records more, until a full one.
-    assert!((20..=120).contains(&report.gaps[2].lost), "{:?}", report.gaps[2]);
+    assert!((20..=120).contains(&report.gaps[2].missing), "{:?}", report.gaps[2]);
     for gap in &report.gaps[1..] {
         assert!(gap.not_replayed <= u64::from(SNAPSHOT_TICKS), "{gap:?}");
-        assert_eq!(u64::from(gap.until_tick - gap.from_tick) + 1, gap.lost + gap.not_replayed);
+        assert_eq!(u64::from(gap.until_tick - gap.from_tick) + 1, gap.missing + gap.not_replayed);
     }
 }
 
@@ -152,7 +154,7 @@ fn a_device_that_starts_anew_is_followed_again() {
     let sent = session.sent;
     session.finish();
     let report = replayed(&path);
-    assert_eq!((report.bits_differ, report.lost), (0, 0));
+    assert_eq!((report.bits_differ, report.missing), (0, 0));
     assert_eq!(report.not_replayed, 2, "{:?}", report.gaps);
     assert_eq!(report.ticks, sent - 2);
     assert_eq!(report.gaps[1].reason, Reason::Restarted);
@@ -180,7 +182,7 @@ fn parameters_that_change_are_taken_over_with_the_next_snapshot() {
     session.finish();
 
     let report = replayed(&path);
-    assert_eq!((report.bits_differ, report.lost), (0, 0), "{:?}", report.first_difference);
+    assert_eq!((report.bits_differ, report.missing), (0, 0), "{:?}", report.first_difference);
     assert_eq!(report.ticks + report.not_replayed, sent);
     let reasons: Vec<_> = report.gaps.iter().map(|gap| gap.reason.clone()).collect();
     assert_eq!(reasons, [Reason::Start, Reason::ParametersChanged]);
@@ -264,7 +266,7 @@ fn damping_makes_the_difference_that_the_law_says() {
             powered += 1;
         }
     }
-    let rms_nm = (squares / f64::from(powered)).sqrt();
+    let rms_nm = (squares / f64::from(powered)).square_root();
     assert!(rms_nm > 1e-4, "the joint hardly moves");
 
     let report = replayed_with(&path, set(&["damping_nm_s[4]=0.02"])).unwrap();

@@ -1,5 +1,8 @@
 //! A device and its host, tick by tick, with a recording of what goes between them.
 
+#![allow(dead_code, reason = "each test file uses its part")]
+#![allow(clippy::unwrap_used, reason = "only tests use it")]
+
 use blindgrasp::record::mcap::{About, Device as Recorded, Saved, Setting, Stamp, Writer};
 use blindgrasp::scene::{HandFile, HandModel};
 use blindgrasp::{MAX_FINGERS, MAX_JOINTS};
@@ -9,6 +12,7 @@ use blindgrasp_shared::fault::Raised;
 use blindgrasp_shared::identity::{Clock, Identity, Image, ResetCause, UNITS};
 use blindgrasp_shared::link::message::{Packet, Reply, Request, Signals};
 use blindgrasp_shared::link::{Receiver, Sender, most_bytes};
+use blindgrasp_shared::math::Real;
 use blindgrasp_shared::settings::Parameter;
 use blindgrasp_shared::telemetry::burst::Burst;
 use blindgrasp_shared::telemetry::{INTERFACE_VERSION, Record};
@@ -53,7 +57,7 @@ impl Hand {
             let Some(joint) = self.file.joints.get(k) else { return 0 };
             let [lower, upper] = joint.limits_rad;
             let frequency_hz = 0.11 + 0.013 * k as f64;
-            let swing = 0.3 * (TAU * frequency_hz * f64::from(tick) * 1e-3 + k as f64).sin();
+            let swing = 0.3 * (TAU * frequency_hz * f64::from(tick) * 1e-3 + k as f64).sine_cosine().0;
             let angle_rad = 0.5 * (lower + upper) + 0.5 * (upper - lower) * swing;
             (angle_rad / TAU * joint.encoder_counts_per_turn).floor() as i32
         })

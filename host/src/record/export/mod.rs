@@ -171,7 +171,7 @@ fn read<E: Iterator<Item = Result<Entry, RecordingError>>>(
         if tick_s < from_s || tick_s > until_s {
             continue;
         }
-        if exported.rows == 0 && !introduce(about.as_ref(), sender)? {
+        if exported.rows == 0 && !introduce(about.as_deref(), sender)? {
             break;
         }
         exported.rows += 1;
@@ -190,16 +190,16 @@ fn read<E: Iterator<Item = Result<Entry, RecordingError>>>(
         }
     }
     if exported.rows == 0 {
-        introduce(about.as_ref(), sender)?;
+        introduce(about.as_deref(), sender)?;
     }
     let _ = sender.send(Batch::Rows(rows));
     Ok(exported)
 }
 
 /// Tells whose rows follow; says whether somebody listens.
-fn introduce(about: Option<&Box<About>>, sender: &SyncSender<Batch>) -> Result<bool, ExportError> {
+fn introduce(about: Option<&About>, sender: &SyncSender<Batch>) -> Result<bool, ExportError> {
     let about = about.ok_or(ExportError::NoSession)?;
-    let sent: Result<(), SendError<Batch>> = sender.send(Batch::About(about.clone()));
+    let sent: Result<(), SendError<Batch>> = sender.send(Batch::About(Box::new(about.clone())));
     Ok(sent.is_ok())
 }
 

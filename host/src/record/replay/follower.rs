@@ -58,7 +58,7 @@ pub struct Follower {
     began_in_a_grasp: bool,
     ticks: u64,
     not_replayed: u64,
-    lost: u64,
+    missing: u64,
     snapshots: u64,
     gaps: Vec<Gap>,
     gap_count: u64,
@@ -133,7 +133,7 @@ impl Follower {
             began_in_a_grasp: false,
             ticks: 0,
             not_replayed: 0,
-            lost: 0,
+            missing: 0,
             snapshots: 0,
             gaps: Vec::new(),
             gap_count: 0,
@@ -189,7 +189,7 @@ impl Follower {
             bits_differ,
             first_difference,
             not_replayed: self.not_replayed,
-            lost: self.lost,
+            missing: self.missing,
             snapshots: self.snapshots,
             gaps: self.gaps,
             gap_count: self.gap_count,
@@ -416,11 +416,13 @@ impl Follower {
     /// Goes on, if the state is known; says whether.
     fn resume(&mut self) -> bool {
         let Some(controller) = &self.controller else { return false };
-        if let Some(front) = self.pending.front() {
-            if front.record.tick == 0 && self.usable == Usable::Any && has_input(&front.record) {
-                // The device's first: before it there was nothing.
-                return self.run(0, State::new());
-            }
+        if let Some(front) = self.pending.front()
+            && front.record.tick == 0
+            && self.usable == Usable::Any
+            && has_input(&front.record)
+        {
+            // The device's first: before it there was nothing.
+            return self.run(0, State::new());
         }
         let Some((tick, bytes)) = self.snapshot.take() else { return false };
         let state = match State::load(&controller.recorded, &bytes) {
@@ -433,10 +435,11 @@ impl Follower {
                 return false;
             }
         };
-        while let Some(told) =
-            self.pending.pop_front_if(|told| told.record.tick.wrapping_sub(tick) as i32 <= 0)
-        {
-            self.pass(&told);
+        let is_before = |told: &Told| told.record.tick.wrapping_sub(tick) as i32 <= 0;
+        while self.pending.front().is_some_and(is_before) {
+            if let Some(told) = self.pending.pop_front() {
+                self.pass(&told);
+            }
         }
         let next = tick.wrapping_add(1);
         let is_next = match self.pending.front() {
@@ -485,16 +488,16 @@ impl Follower {
         if span == 0 || self.wanted.from_s.is_some_and(|from_s| time_s < from_s) {
             return;
         }
-        let lost = span.saturating_sub(pause.passed);
+        let missing = span.saturating_sub(pause.passed);
         self.not_replayed += pause.passed;
-        self.lost += lost;
+        self.missing += missing;
         self.gap_count += 1;
         if self.gaps.len() < LISTED {
             self.gaps.push(Gap {
                 time_s,
                 from_tick,
                 until_tick: next.wrapping_sub(1),
-                lost,
+                missing,
                 not_replayed: pause.passed,
                 reason: pause.reason.clone(),
             });

@@ -8,8 +8,9 @@ use blindgrasp_shared::link::Listener;
 use blindgrasp_shared::link::message::Reply;
 use blindgrasp_shared::telemetry::snapshot::Part;
 
-/// Something that a replay follows.
+/// Something that a replay follows. Nearly all of them are records, which need no box.
 #[derive(Clone, Debug)]
+#[allow(clippy::large_enum_variant)]
 pub enum Item {
     /// A session began.
     Session(Box<About>),

@@ -128,7 +128,7 @@ pub struct Gap {
     /// Its last tick.
     pub until_tick: u32,
     /// Ticks whose records are missing.
-    pub lost: u64,
+    pub missing: u64,
     /// Records that were not replayed.
     pub not_replayed: u64,
     /// Why.

@@ -74,3 +74,52 @@ impl Model {
         Params::new(self.hand.clone(), &config).map_err(ReplayError::Changed)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::HandFile;
+    use blindgrasp_shared::fault::FaultConfig;
+    use blindgrasp_shared::limit::LimitConfig;
+
+    #[test]
+    fn any_configuration_comes_back_from_its_parameters() {
+        let model = HandModel::load("three-finger").unwrap();
+        let file = HandFile::load("three-finger").unwrap();
+        let about = About {
+            hand: model.name.clone(),
+            hand_hash: model.hash(),
+            joint_count: 12,
+            fingertip_count: 3,
+            period_us: 1000,
+            ..About::default()
+        }
+        .with_hand(&file);
+        let recorded = Model::new(&about, None).unwrap();
+        let mut configs = vec![model.config];
+        // Everything that can be switched is on in the hand's file: off, in turns.
+        let change = |change: fn(&mut Config<f32, MAX_JOINTS>)| {
+            let mut config = model.config;
+            config.law.force_n = 4.0;
+            config.law.damping_nm_s[7] = 0.125;
+            config.faults.heartbeat_ms = Some(77);
+            change(&mut config);
+            config
+        };
+        configs.push(change(|_| {}));
+        configs.push(change(|config| config.limits = LimitConfig::NONE));
+        configs.push(change(|config| config.faults = FaultConfig::LEAST));
+        configs.push(change(|config| config.law.gravity_m_s2 = None));
+        for config in &configs {
+            let settings = Setting::all(&recorded.params(config).unwrap());
+            for before in [None, Some(&configs[2]), Some(&configs[3])] {
+                assert_eq!(recorded.config(before, &settings).unwrap(), *config);
+            }
+        }
+        let other = About { hand_hash: 1, ..about.clone() };
+        assert!(matches!(Model::new(&other, None), Err(ReplayError::OtherHand { .. })));
+        let unknown = About { hand_file: None, ..about };
+        assert!(matches!(Model::new(&unknown, None), Err(ReplayError::UnknownHand { .. })));
+        assert!(Model::new(&unknown, Some(&model)).is_ok());
+    }
+}

@@ -4,6 +4,7 @@ use super::report::{JointChange, LimitShare, OpenLoop, Raising};
 use crate::device::client::Record;
 use blindgrasp_shared::fault::Raised;
 use blindgrasp_shared::limit::Limit;
+use blindgrasp_shared::math::Real;
 use blindgrasp_shared::supervisor::Mode;
 
 /// Faults that are listed; all are counted.
@@ -125,7 +126,7 @@ impl Beside {
         });
         let mut joints = self.largest;
         for (joint, square) in joints.iter_mut().zip(&self.squares) {
-            joint.rms_nm = if self.powered == 0 { 0.0 } else { (square / self.powered as f64).sqrt() };
+            joint.rms_nm = if self.powered == 0 { 0.0 } else { (square / self.powered as f64).square_root() };
         }
         OpenLoop {
             note: OpenLoop::NOTE,

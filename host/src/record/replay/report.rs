@@ -21,7 +21,7 @@ pub struct Report {
     /// Records that could not be compared, because the state before them is not known.
     pub not_replayed: u64,
     /// Ticks whose records are missing.
-    pub lost: u64,
+    pub missing: u64,
     /// Snapshots of the device's whole state that were compared, too; what differs in them is counted above.
     pub snapshots: u64,
     /// Where something is missing, or was not replayed: the first of them.
@@ -141,7 +141,7 @@ impl fmt::Display for Report {
         }
         line("whole states", &format_args!("{} compared", self.snapshots))?;
         line("not replayed", &format_args!("{} records", self.not_replayed))?;
-        line("lost", &format_args!("{} ticks", self.lost))?;
+        line("missing", &format_args!("{} ticks", self.missing))?;
         for gap in &self.gaps {
             line("  gap", gap)?;
         }
@@ -165,7 +165,7 @@ impl fmt::Display for Gap {
             "at {:.3} s, ticks {} to {}: {}",
             self.time_s, self.from_tick, self.until_tick, self.reason
         )?;
-        write!(f, " ({} lost, {} not replayed)", self.lost, self.not_replayed)
+        write!(f, " ({} missing, {} not replayed)", self.missing, self.not_replayed)
     }
 }
 
