@@ -22,6 +22,8 @@ enum Command {
     Record(commands::record::Arguments),
     #[cfg(unix)]
     Serve(commands::serve::Arguments),
+    Replay(commands::replay::Arguments),
+    Export(commands::export::Arguments),
 }
 
 fn main() -> ExitCode {
@@ -33,6 +35,8 @@ fn main() -> ExitCode {
         Command::Record(arguments) => commands::record::run(&arguments),
         #[cfg(unix)]
         Command::Serve(arguments) => commands::serve::run(&arguments),
+        Command::Replay(arguments) => commands::replay::run(&arguments),
+        Command::Export(arguments) => commands::export::run(&arguments),
     };
     match outcome {
         Ok(commands::Outcome::Shown) => ExitCode::SUCCESS,

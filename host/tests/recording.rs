@@ -4,8 +4,8 @@ use blindgrasp::record::mcap::{About, Arrival, Decoder, Level, Recording, Settin
 use blindgrasp::scene::{HandFile, HandModel};
 use blindgrasp_shared::identity::{Clock, Identity, Image, ResetCause, UNITS};
 use blindgrasp_shared::link::Receiver;
-use blindgrasp_shared::link::message::{Reply, Signals};
 use blindgrasp_shared::link::Sender;
+use blindgrasp_shared::link::message::{Reply, Signals};
 use blindgrasp_shared::telemetry::{INTERFACE_VERSION, List, Record};
 
 #[test]
@@ -21,6 +21,8 @@ fn smoke() {
     let recording = Recording::open(&path).unwrap();
     println!("{:?}", recording);
     let mut entries = recording.entries().unwrap();
-    for entry in &mut entries { println!("{entry:?}"); }
+    for entry in &mut entries {
+        println!("{entry:?}");
+    }
     println!("{}", entries.damage());
 }
