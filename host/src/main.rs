@@ -19,6 +19,7 @@ enum Command {
     Pil(commands::pil::Arguments),
     Flash(commands::flash::Arguments),
     Console(commands::console::Arguments),
+    Monitor(commands::monitor::Arguments),
 }
 
 fn main() -> ExitCode {
@@ -27,6 +28,7 @@ fn main() -> ExitCode {
         Command::Pil(arguments) => commands::pil::run(&arguments),
         Command::Flash(arguments) => commands::flash::run(&arguments),
         Command::Console(arguments) => commands::console::run(&arguments),
+        Command::Monitor(arguments) => commands::monitor::run(&arguments),
     };
     match outcome {
         Ok(commands::Outcome::Shown) => ExitCode::SUCCESS,
