@@ -20,6 +20,8 @@ enum Command {
     Flash(commands::flash::Arguments),
     Console(commands::console::Arguments),
     Monitor(commands::monitor::Arguments),
+    #[cfg(unix)]
+    Serve(commands::serve::Arguments),
 }
 
 fn main() -> ExitCode {
@@ -29,6 +31,8 @@ fn main() -> ExitCode {
         Command::Flash(arguments) => commands::flash::run(&arguments),
         Command::Console(arguments) => commands::console::run(&arguments),
         Command::Monitor(arguments) => commands::monitor::run(&arguments),
+        #[cfg(unix)]
+        Command::Serve(arguments) => commands::serve::run(&arguments),
     };
     match outcome {
         Ok(commands::Outcome::Shown) => ExitCode::SUCCESS,

@@ -143,6 +143,17 @@ impl Plan {
         }
         Ok(Self { params: Params::new(scene.hand.cast(), &config)?, hand })
     }
+
+    /// The scene's parameters, with the faults that only a link and a clock can cause as the hand has them.
+    ///
+    /// # Errors
+    /// The first that the controller refuses.
+    pub fn parameters(&self) -> Result<Params<f32, MAX_JOINTS, MAX_FINGERS>, ParameterError> {
+        let faults = self.hand.config.faults;
+        let mut config = *self.params.config();
+        (config.faults.heartbeat_ms, config.faults.late_ticks) = (faults.heartbeat_ms, faults.late_ticks);
+        Params::new(self.params.hand().clone(), &config)
+    }
 }
 
 /// A device that does a tick for each sample of joints.
