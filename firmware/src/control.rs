@@ -6,13 +6,18 @@ use crate::joints::Joints;
 use crate::model::{FINGERS, JOINTS};
 use crate::queue::HandPacket;
 #[cfg(target_os = "none")]
-use crate::{queue::ControlEnd, schedule::Turn};
+use crate::{
+    queue::{ControlEnd, Telemetry},
+    schedule::Turn,
+};
 use blindgrasp_shared::command::Command;
 use blindgrasp_shared::device::{Device, Inputs, Outputs, Reading};
 use blindgrasp_shared::fault::Raised;
-#[cfg(target_os = "none")]
-use blindgrasp_shared::link::message::Reply;
 use blindgrasp_shared::link::message::Request;
+use blindgrasp_shared::telemetry::burst::Burst;
+
+/// The records around a fault.
+pub type HandBurst = Burst<JOINTS>;
 
 /// What the turn before told about itself.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -33,13 +38,15 @@ pub fn task(
 ) -> Timing {
     let turn = Turn::begin();
     let packet = queues.take();
-    let mut outputs = control.turn(joints, packet, last, queues.dropped());
+    let outputs = control.turn(joints, packet, last, queues.dropped());
     if let Some(reply) = outputs.reply {
-        queues.post(reply);
+        queues.answer(reply);
     }
     if let Some(signals) = outputs.telemetry {
-        outputs.record.keep(signals);
-        queues.post(Reply::Record(outputs.record));
+        queues.tell(Telemetry::Record(outputs.record, signals));
+    }
+    if let Some(part) = outputs.part {
+        queues.tell(Telemetry::Part(part));
     }
     turn.end()
 }
@@ -47,14 +54,16 @@ pub fn task(
 /// The hand, and what one turn leaves for the next.
 pub struct Control {
     device: Device<JOINTS, FINGERS>,
+    /// Too large for a stack.
+    burst: &'static mut HandBurst,
     /// What went wrong when the joints were last written.
     failed: Option<Raised>,
 }
 
 impl Control {
     /// Before the first turn.
-    pub fn new(device: Device<JOINTS, FINGERS>) -> Self {
-        Self { device, failed: None }
+    pub fn new(device: Device<JOINTS, FINGERS>, burst: &'static mut HandBurst) -> Self {
+        Self { device, burst, failed: None }
     }
 
     /// One turn. Torques that could not be written are a failed reading in the next.
@@ -74,7 +83,7 @@ impl Control {
         let read = joints.read();
         let reading = self.failed.take().map_or(read, Reading::Failed);
         let inputs = Inputs { reading, late: last.late, cycles: last.cycles, dropped, packet };
-        let outputs = self.device.tick(&inputs);
+        let outputs = self.device.tick(&inputs, self.burst);
         self.failed = joints.write(&outputs.torques_nm);
         outputs
     }

@@ -1,10 +1,10 @@
 //! Between the line and the control task: frames to packets, replies to frames. Runs when nothing else does.
 
 use crate::model::JOINTS;
-use crate::queue::{HandPacket, HandReply, LinkEnd};
+use crate::queue::{HandPacket, HandReply, LinkEnd, Outgoing, Telemetry};
 use blindgrasp_shared::command::Refusal;
 use blindgrasp_shared::link::message::{Packet, Reply, not_understood};
-use blindgrasp_shared::link::{Counters, Receiver, encode, most_bytes};
+use blindgrasp_shared::link::{Counters, Receiver, Sender, most_bytes};
 use heapless::Deque;
 
 /// Bytes of the longest payload that is received, with its CRC.
@@ -72,6 +72,7 @@ pub struct Link<'q, P> {
     queues: LinkEnd<'q>,
     /// Requests that do not get to the control task: their numbers, and why not.
     refusals: Deque<(u16, Refusal), REFUSALS>,
+    sender: Sender<JOINTS>,
     /// The frame that is being sent, what of it is sent, and its length.
     frame: [u8; MOST_SENT],
     sent: usize,
@@ -86,6 +87,7 @@ impl<'q, P: Port> Link<'q, P> {
             frames: Frames::new(),
             queues,
             refusals: Deque::new(),
+            sender: Sender::new(),
             frame: [0; MOST_SENT],
             sent: 0,
             length: 0,
@@ -111,14 +113,22 @@ impl<'q, P: Port> Link<'q, P> {
             let _ = self.refusals.push_back(refusal);
         }
         if self.sent == self.length
-            && let Some(reply) = self
+            && let Some(next) = self
                 .refusals
                 .pop_front()
-                .map(|(sequence, reason)| refused(sequence, reason))
+                .map(|(sequence, reason)| Outgoing::Answer(refused(sequence, reason)))
                 .or_else(|| self.queues.take())
         {
+            let (sender, buffer) = (&mut self.sender, &mut self.frame);
+            let frame = match next {
+                Outgoing::Answer(reply) => sender.reply(&reply, buffer),
+                Outgoing::Telemetry(Telemetry::Record(record, signals)) => {
+                    sender.record(&record, signals, buffer)
+                }
+                Outgoing::Telemetry(Telemetry::Part(part)) => sender.reply(&Reply::Snapshot(part), buffer),
+            };
             // The buffer has room for the longest reply, so this can't fail.
-            self.length = encode(&reply, &mut self.frame).map_or(0, <[u8]>::len);
+            self.length = frame.map_or(0, <[u8]>::len);
             self.sent = 0;
         }
         if self.sent < self.length
@@ -153,6 +163,7 @@ mod tests {
     use super::*;
     use crate::queue::Queues;
     use blindgrasp_shared::command::Command;
+    use blindgrasp_shared::link::encode;
     use blindgrasp_shared::link::message::Request;
     use std::collections::VecDeque;
     use std::vec::Vec;
@@ -253,7 +264,7 @@ mod tests {
         let mut queues = Queues::new();
         let (mut control, end) = queues.split();
         for sequence in 0..5 {
-            control.post(Reply::Answer { sequence, refused: None });
+            control.answer(Reply::Answer { sequence, refused: None });
         }
         settle(&mut Link::new(&mut wire, end));
         let expected: Vec<_> = (0..5).map(|sequence| (sequence, None)).collect();

@@ -5,7 +5,9 @@
 
 use crate::model::JOINTS;
 use blindgrasp_shared::command::Command;
-use blindgrasp_shared::link::message::{Packet, Reply, Request};
+use blindgrasp_shared::link::message::{Packet, Reply, Request, Signals};
+use blindgrasp_shared::telemetry::Record;
+use blindgrasp_shared::telemetry::snapshot::Part;
 use heapless::spsc::{Consumer, Producer, Queue};
 
 /// A packet to this hand.
@@ -13,12 +15,27 @@ pub type HandPacket = Packet<JOINTS>;
 /// A reply of this hand.
 pub type HandReply = Reply<'static, JOINTS>;
 
+/// What the hand tells by itself.
+pub enum Telemetry {
+    /// What a tick did, and what of it is to be sent.
+    Record(Record<f32, JOINTS>, Signals),
+    /// A part of a snapshot.
+    Part(Part),
+}
+
+/// What the link sends next.
+pub enum Outgoing {
+    /// An answer to a request.
+    Answer(HandReply),
+    /// Telemetry.
+    Telemetry(Telemetry),
+}
+
 /// Packets that wait for a tick; the control task takes one a millisecond. A queue holds one less than its size.
 const PACKETS: usize = 8;
-/// Answers that wait for the line. They go before records, at most one a tick comes, and the longest record takes less
-/// than two ticks: so there is always room.
+/// Answers that wait for the line. They go before telemetry.
 const ANSWERS: usize = 8;
-/// Records that wait for the line.
+/// Records and parts of snapshots that wait for the line.
 const RECORDS: usize = 8;
 /// A second stop before the first is acted on says nothing new.
 const STOPS: usize = 2;
@@ -28,7 +45,7 @@ pub struct Queues {
     stops: Queue<HandPacket, STOPS>,
     packets: Queue<HandPacket, PACKETS>,
     answers: Queue<HandReply, ANSWERS>,
-    records: Queue<HandReply, RECORDS>,
+    records: Queue<Telemetry, RECORDS>,
 }
 
 impl Queues {
@@ -61,7 +78,7 @@ pub struct ControlEnd<'q> {
     stops: Consumer<'q, HandPacket>,
     packets: Consumer<'q, HandPacket>,
     answers: Producer<'q, HandReply>,
-    records: Producer<'q, HandReply>,
+    records: Producer<'q, Telemetry>,
     dropped: u32,
 }
 
@@ -71,18 +88,19 @@ impl ControlEnd<'_> {
         dequeue(&mut self.stops).or_else(|| dequeue(&mut self.packets))
     }
 
-    /// Leaves a reply for the line, or drops and counts it. Records never take the room of answers.
-    pub fn post(&mut self, reply: HandReply) {
-        let queue = match reply {
-            Reply::Record(_) => &mut self.records,
-            _ => &mut self.answers,
-        };
-        if enqueue(queue, reply).is_err() {
-            self.dropped = self.dropped.saturating_add(1);
-        }
+    /// Leaves an answer for the line, or drops and counts it.
+    pub fn answer(&mut self, reply: HandReply) {
+        let lost = enqueue(&mut self.answers, reply).is_err();
+        self.dropped = self.dropped.saturating_add(u32::from(lost));
     }
 
-    /// How many replies and records were dropped so far.
+    /// Leaves telemetry for the line, or drops and counts it. It never takes the room of answers.
+    pub fn tell(&mut self, telemetry: Telemetry) {
+        let lost = enqueue(&mut self.records, telemetry).is_err();
+        self.dropped = self.dropped.saturating_add(u32::from(lost));
+    }
+
+    /// How many answers, records and parts were dropped so far.
     pub fn dropped(&self) -> u32 {
         self.dropped
     }
@@ -93,7 +111,7 @@ pub struct LinkEnd<'q> {
     stops: Producer<'q, HandPacket>,
     packets: Producer<'q, HandPacket>,
     answers: Consumer<'q, HandReply>,
-    records: Consumer<'q, HandReply>,
+    records: Consumer<'q, Telemetry>,
 }
 
 impl LinkEnd<'_> {
@@ -109,9 +127,10 @@ impl LinkEnd<'_> {
         }
     }
 
-    /// The next reply to send: answers before records.
-    pub fn take(&mut self) -> Option<HandReply> {
-        dequeue(&mut self.answers).or_else(|| dequeue(&mut self.records))
+    /// What to send next: answers before telemetry.
+    pub fn take(&mut self) -> Option<Outgoing> {
+        let answer = dequeue(&mut self.answers).map(Outgoing::Answer);
+        answer.or_else(|| dequeue(&mut self.records).map(Outgoing::Telemetry))
     }
 
     /// Whether nothing waits to be sent.
@@ -144,6 +163,8 @@ mod tests {
     use super::*;
     use blindgrasp_shared::device::{Device, Inputs, Reading};
     use blindgrasp_shared::identity::{Clock, Identity, Image, ResetCause, UNITS};
+    use blindgrasp_shared::telemetry::burst::Burst;
+    use std::boxed::Box;
 
     fn packet(sequence: u16, request: Request<JOINTS>) -> HandPacket {
         Packet { session: 1, sequence, request }
@@ -165,7 +186,7 @@ mod tests {
         assert_eq!(order, expected);
     }
 
-    fn record() -> HandReply {
+    fn record() -> Telemetry {
         let hand = crate::model::params();
         let identity = Identity {
             image: Image::decode(&crate::model::IMAGE_HAND).unwrap(),
@@ -181,7 +202,8 @@ mod tests {
             dropped: 0,
             packet: None,
         };
-        Reply::Record(Device::new(hand, identity).tick(&inputs).record)
+        let mut burst = Box::new(Burst::new());
+        Telemetry::Record(Device::new(hand, identity).tick(&inputs, &mut burst).record, Signals::ALL)
     }
 
     #[test]
@@ -189,18 +211,20 @@ mod tests {
         let mut queues = Queues::new();
         let (mut control, mut link) = queues.split();
         for _ in 0..RECORDS + 2 {
-            control.post(record());
+            control.tell(record());
         }
         assert_eq!(control.dropped(), 3);
         for sequence in 0..ANSWERS as u16 - 1 {
-            control.post(Reply::Answer { sequence, refused: None });
+            control.answer(Reply::Answer { sequence, refused: None });
         }
         assert_eq!(control.dropped(), 3);
         for expected in 0..ANSWERS as u16 - 1 {
-            assert!(matches!(link.take(), Some(Reply::Answer { sequence, .. }) if sequence == expected));
+            assert!(
+                matches!(link.take(), Some(Outgoing::Answer(Reply::Answer { sequence, .. })) if sequence == expected)
+            );
         }
         for _ in 0..RECORDS - 1 {
-            assert!(!link.is_empty() && matches!(link.take(), Some(Reply::Record(_))));
+            assert!(!link.is_empty() && matches!(link.take(), Some(Outgoing::Telemetry(_))));
         }
         assert!(link.is_empty());
     }

@@ -107,6 +107,8 @@ refusals! {
     NotUnderstood      = "this is no request of this interface version";
     Busy               = "too many requests are waiting: wait for the answers";
     JointsAreReal      = "this image has real joints: only the image `pil` takes them over the link";
+    NoBurst            = "no fault was caught since the hand was last armed";
+    BurstNotOver       = "the records after the fault are still being taken: ask again in a moment";
 }
 
 /// What became of a command.

@@ -10,6 +10,8 @@ use crate::fault::Raised;
 use crate::identity::{Clock, Identity};
 use crate::link::message::{Packet, Reply, Request, Signals};
 use crate::supervisor::Mode;
+use crate::telemetry::burst::{Burst, Caught};
+use crate::telemetry::snapshot::{Outgoing, Part};
 use crate::telemetry::{INTERFACE_VERSION, Record};
 use crate::tick::{Input, Params, Sensed, State, tick};
 
@@ -48,6 +50,8 @@ pub struct Outputs<const J: usize> {
     pub telemetry: Option<Signals>,
     /// The answer to the request.
     pub reply: Option<Reply<'static, J>>,
+    /// A part of a snapshot that is to be sent.
+    pub part: Option<Part>,
 }
 
 /// A hand's controller with its link.
@@ -58,6 +62,7 @@ pub struct Device<const J: usize, const F: usize> {
     identity: Identity<'static>,
     session: Session,
     telemetry: Telemetry,
+    snapshot: Outgoing<J>,
 }
 
 impl<const J: usize, const F: usize> Device<J, F> {
@@ -68,7 +73,8 @@ impl<const J: usize, const F: usize> Device<J, F> {
             state: State::new(),
             identity,
             session: Session { number: 0, sequence: 0, understood: false },
-            telemetry: Telemetry { decimation: 0, signals: Signals::NONE, left: 0, sent: 0 },
+            telemetry: Telemetry::OFF,
+            snapshot: Outgoing::new(),
         }
     }
 
@@ -82,10 +88,10 @@ impl<const J: usize, const F: usize> Device<J, F> {
         &self.state
     }
 
-    /// One tick, with its request.
-    pub fn tick(&mut self, inputs: &Inputs<J>) -> Outputs<J> {
+    /// One tick, with its request. Its record goes into the burst, too.
+    pub fn tick(&mut self, inputs: &Inputs<J>, burst: &mut Burst<J>) -> Outputs<J> {
         let asked = match &inputs.packet {
-            Some(packet) => self.ask(packet),
+            Some(packet) => self.ask(packet, burst),
             None => Asked::Nothing,
         };
         let heartbeat = matches!(asked, Asked::Heartbeat { .. });
@@ -107,7 +113,13 @@ impl<const J: usize, const F: usize> Device<J, F> {
         let mut output = tick(&self.params, &mut self.state, &input);
         output.record.cycles = inputs.cycles;
         output.record.dropped = inputs.dropped;
+        burst.take(&output.record);
+        self.telemetry.adapt(inputs.dropped);
+        let part = self.part(output.record.tick);
         let telemetry = self.telemetry.due();
+        if self.telemetry.decimation > 0 {
+            output.record.decimation = self.telemetry.decimation;
+        }
         if telemetry.is_some() {
             output.record.sequence = self.telemetry.sent;
             self.telemetry.sent = self.telemetry.sent.wrapping_add(1);
@@ -121,11 +133,23 @@ impl<const J: usize, const F: usize> Device<J, F> {
                 Some(Reply::Answer { sequence, refused })
             }
         };
-        Outputs { torques_nm: output.torques_nm, record: output.record, telemetry, reply }
+        Outputs { torques_nm: output.torques_nm, record: output.record, telemetry, reply, part }
+    }
+
+    /// Saves the state where it is due, and the part of it that is to be sent now.
+    fn part(&mut self, tick: u32) -> Option<Part> {
+        if !self.telemetry.sends_state() {
+            return None;
+        }
+        if self.telemetry.state_is_due(self.snapshot.is_over()) {
+            let (state, params) = (&self.state, &self.params);
+            self.snapshot.begin(tick, |buffer| state.save(params, buffer));
+        }
+        if self.telemetry.part_is_due() { self.snapshot.next() } else { None }
     }
 
     /// What becomes of a request before the tick.
-    fn ask(&mut self, packet: &Packet<J>) -> Asked<J> {
+    fn ask(&mut self, packet: &Packet<J>, burst: &Burst<J>) -> Asked<J> {
         let sequence = packet.sequence;
         let answer = |refused| Asked::Answered(Reply::Answer { sequence, refused });
         match packet.request {
@@ -163,9 +187,18 @@ impl<const J: usize, const F: usize> Device<J, F> {
                 if !signals.are_known() {
                     return answer(Some(Refusal::OutOfRange));
                 }
-                self.telemetry = Telemetry { decimation, signals, left: 0, ..self.telemetry };
+                self.telemetry.begin(decimation, signals);
+                self.snapshot.stop();
                 answer(None)
             }
+            Request::Burst { index } => match burst.get(index) {
+                Caught::Nothing => answer(Some(Refusal::NoBurst)),
+                Caught::NotOver => answer(Some(Refusal::BurstNotOver)),
+                Caught::NoSuchRecord => answer(Some(Refusal::OutOfRange)),
+                Caught::Record { count, record } => {
+                    Asked::Answered(Reply::Burst { sequence, index, count, record: record.clone() })
+                }
+            },
             Request::Joints(_) => answer(Some(Refusal::JointsAreReal)),
             // Taken above.
             Request::Hello { .. } => answer(None),
@@ -211,19 +244,77 @@ impl Session {
     }
 }
 
+/// Ticks from one snapshot of the state to the next.
+const STATE_EVERY_TICKS: u32 = 1000;
+/// Ticks from one part of a snapshot to the next.
+const PART_EVERY_TICKS: u32 = 4;
+/// Ticks in which a change of the decimation shows.
+const ADAPT_EVERY_TICKS: u32 = 64;
+/// Largest decimation that a device chooses by itself.
+const DECIMATION_MOST: u16 = 1000;
+
 /// Which records are sent.
 #[derive(Clone, Copy, Debug)]
 struct Telemetry {
-    /// One in so many ticks; 0 for none.
+    /// What was asked for: one in so many ticks; 0 for none.
+    asked: u16,
+    /// The same as it is now, for a line that is slower.
     decimation: u16,
     signals: Signals,
-    /// Ticks until the next one.
-    left: u16,
+    /// Ticks until the next record.
+    left: u32,
     /// Records sent so far.
     sent: u32,
+    /// No record was sent since it was asked for.
+    is_new: bool,
+    /// Ticks until the next snapshot, and until the next part of one.
+    state_left: u32,
+    part_left: u32,
+    /// What was lost so far, and whether some of it was lost since the decimation was chosen, so many ticks ago.
+    dropped: u32,
+    loses: bool,
+    chosen: u32,
 }
 
 impl Telemetry {
+    const OFF: Self = Self {
+        asked: 0,
+        decimation: 0,
+        signals: Signals::NONE,
+        left: 0,
+        sent: 0,
+        is_new: true,
+        state_left: 0,
+        part_left: 0,
+        dropped: 0,
+        loses: false,
+        chosen: 0,
+    };
+
+    /// What is asked for from now on.
+    fn begin(&mut self, decimation: u16, signals: Signals) {
+        let Self { sent, dropped, .. } = *self;
+        // The first loss is acted on at once.
+        let chosen = ADAPT_EVERY_TICKS;
+        *self = Self { asked: decimation, decimation, signals, sent, dropped, chosen, ..Self::OFF };
+    }
+
+    /// Sends less when the line does not take it all.
+    fn adapt(&mut self, dropped: u32) {
+        let lost = dropped != self.dropped;
+        self.dropped = dropped;
+        if self.decimation == 0 {
+            return;
+        }
+        self.loses |= lost;
+        self.chosen = self.chosen.saturating_add(1);
+        if self.loses && self.chosen >= ADAPT_EVERY_TICKS {
+            self.decimation = self.decimation.saturating_mul(2).min(DECIMATION_MOST.max(self.asked));
+            self.loses = false;
+            self.chosen = 0;
+        }
+    }
+
     /// Whether this tick's record is to be sent.
     fn due(&mut self) -> Option<Signals> {
         if self.decimation == 0 {
@@ -233,7 +324,35 @@ impl Telemetry {
             self.left -= 1;
             return None;
         }
-        self.left = self.decimation - 1;
-        Some(self.signals)
+        self.left = u32::from(self.decimation) - 1;
+        // What a host begins with is whole, whatever the link sent to one before.
+        let left_out = if self.is_new { Signals::DENSE } else { Signals::NONE };
+        self.is_new = false;
+        Some(self.signals.without(left_out))
+    }
+
+    /// Whether snapshots are sent.
+    fn sends_state(&self) -> bool {
+        self.decimation > 0 && self.signals.contain(Signals::STATE)
+    }
+
+    /// Whether the state is to be saved; never before the last snapshot is on its way.
+    fn state_is_due(&mut self, is_over: bool) -> bool {
+        self.state_left = self.state_left.saturating_sub(1);
+        let is_due = self.state_left == 0 && is_over;
+        if is_due {
+            self.state_left = STATE_EVERY_TICKS;
+        }
+        is_due
+    }
+
+    /// Whether a part is to be sent: as much more rarely than asked for as records are.
+    fn part_is_due(&mut self) -> bool {
+        self.part_left = self.part_left.saturating_sub(1);
+        let is_due = self.part_left == 0;
+        if is_due {
+            self.part_left = PART_EVERY_TICKS * u32::from(self.decimation / self.asked.max(1)).max(1);
+        }
+        is_due
     }
 }

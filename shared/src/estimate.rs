@@ -41,9 +41,11 @@
 //! Counts are subtracted as integers, with wrap-around, before anything becomes a float: what the filter keeps are
 //! small numbers, however far the counters have run.
 
+use crate::buffer::BufferTooSmall;
 use crate::math::Real;
 use crate::parameter::ParameterError;
 use crate::period::Period;
+use crate::telemetry::snapshot::{Loader, Saver, SnapshotError};
 
 /// How the counts of one joint are read.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -153,6 +155,33 @@ impl<T: Real, const J: usize> Tracks<T, J> {
     }
 }
 
+impl<const J: usize> Tracks<f32, J> {
+    pub(crate) fn save(&self, joints: usize, to: &mut Saver<'_>) -> Result<(), BufferTooSmall> {
+        to.u8(u8::from(self.started))?;
+        for track in self.tracks.iter().take(joints) {
+            to.u32(track.count as u32)?;
+            to.f32(track.play)?;
+            to.f32(track.ahead)?;
+            to.f32(track.speed)?;
+        }
+        Ok(())
+    }
+
+    pub(crate) fn load(joints: usize, from: &mut Loader<'_>) -> Result<Self, SnapshotError> {
+        let mut tracks = Self::new();
+        tracks.started = from.flag()?;
+        for track in tracks.tracks.iter_mut().take(joints) {
+            *track = Track {
+                count: from.u32()? as i32,
+                play: from.f32()?,
+                ahead: from.f32()?,
+                speed: from.f32()?,
+            };
+        }
+        Ok(tracks)
+    }
+}
+
 impl<T: Real, const J: usize> Default for Tracks<T, J> {
     fn default() -> Self {
         Self::new()
@@ -174,6 +203,28 @@ impl<T: Real, const J: usize> Motion<T, J> {
     /// At rest at zero.
     pub fn still() -> Self {
         Self { angles_rad: [T::zero(); J], speeds_rad_s: [T::zero(); J], count_changes: [0; J] }
+    }
+}
+
+impl<const J: usize> Motion<f32, J> {
+    /// Without the changes of the counts: they say something of their own tick only.
+    pub(crate) fn save(&self, joints: usize, to: &mut Saver<'_>) -> Result<(), BufferTooSmall> {
+        for (&angle_rad, &speed_rad_s) in self.angles_rad.iter().zip(&self.speeds_rad_s).take(joints) {
+            to.f32(angle_rad)?;
+            to.f32(speed_rad_s)?;
+        }
+        Ok(())
+    }
+
+    pub(crate) fn load(joints: usize, from: &mut Loader<'_>) -> Result<Self, SnapshotError> {
+        let mut motion = Self::still();
+        for (angle_rad, speed_rad_s) in
+            motion.angles_rad.iter_mut().zip(&mut motion.speeds_rad_s).take(joints)
+        {
+            *angle_rad = from.f32()?;
+            *speed_rad_s = from.f32()?;
+        }
+        Ok(motion)
     }
 }
 

@@ -43,6 +43,16 @@ impl Events {
         if there { Self(self.0 | event as u8) } else { self }
     }
 
+    /// The bits, as they go over the wire.
+    pub const fn bits(self) -> u8 {
+        self.0
+    }
+
+    /// The events of such bits, if there is a meaning to each.
+    pub const fn from_bits(bits: u8) -> Option<Self> {
+        if bits < 1 << Event::ALL.len() { Some(Self(bits)) } else { None }
+    }
+
     /// Whether one is among them.
     pub const fn contains(self, event: Event) -> bool {
         self.0 & event as u8 != 0

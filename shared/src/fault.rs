@@ -6,12 +6,14 @@
 //!
 //! Limits ([`limit`](crate::limit)) are no faults; a joint whose torque stays at its limit for long is one.
 
+use crate::buffer::BufferTooSmall;
 use crate::estimate::{Estimator, Motion};
 use crate::hand::Hand;
 use crate::limit::{Limit, Limiting};
 use crate::math::Real;
 use crate::parameter::ParameterError;
 use crate::period::Period;
+use crate::telemetry::snapshot::{Loader, Saver, SnapshotError};
 use core::fmt;
 use serde::{Deserialize, Serialize};
 
@@ -386,6 +388,41 @@ impl<T: Real, const J: usize> Watched<T, J> {
     /// Work of the joints in the last second, J; what was done earlier fades.
     pub fn energy_j(&self) -> T {
         self.energy_j
+    }
+}
+
+impl<const J: usize> Watched<f32, J> {
+    pub(crate) fn save(&self, joints: usize, to: &mut Saver<'_>) -> Result<(), BufferTooSmall> {
+        for (&saturated, standstill) in self.saturated.iter().zip(&self.standstills).take(joints) {
+            to.u32(saturated)?;
+            to.u32(standstill.ticks)?;
+            to.f32(standstill.torque_nm)?;
+            to.f32(standstill.before_rad)?;
+            to.f32(standstill.after_rad)?;
+        }
+        to.u32(self.silent)?;
+        to.u32(self.late)?;
+        to.u32(self.late_ticks)?;
+        to.f32(self.energy_j)
+    }
+
+    pub(crate) fn load(joints: usize, from: &mut Loader<'_>) -> Result<Self, SnapshotError> {
+        let mut watched = Self::new();
+        for (saturated, standstill) in watched.saturated.iter_mut().zip(&mut watched.standstills).take(joints)
+        {
+            *saturated = from.u32()?;
+            *standstill = Standstill {
+                ticks: from.u32()?,
+                torque_nm: from.f32()?,
+                before_rad: from.f32()?,
+                after_rad: from.f32()?,
+            };
+        }
+        watched.silent = from.u32()?;
+        watched.late = from.u32()?;
+        watched.late_ticks = from.u32()?;
+        watched.energy_j = from.f32()?;
+        Ok(watched)
     }
 }
 

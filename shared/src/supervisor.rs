@@ -27,11 +27,13 @@
 //!
 //! In a tick, a fault that is there comes first, then the command, then the end of a release.
 
+use crate::buffer::BufferTooSmall;
 use crate::command::{Answer, Command, Refusal};
-use crate::fault::{Raised, Reaction};
+use crate::fault::{Fault, Raised, Reaction};
 use crate::math::Real;
 use crate::parameter::ParameterError;
 use crate::period::Period;
+use crate::telemetry::snapshot::{Loader, Saver, SnapshotError};
 use serde::{Deserialize, Serialize};
 
 /// A mode.
@@ -202,6 +204,32 @@ impl Supervisor {
     /// Disarmed, without a fault.
     pub const fn new() -> Self {
         Self { mode: Mode::Disarmed, fault: None, age: 0, grasped: 0 }
+    }
+
+    pub(crate) fn save(&self, to: &mut Saver<'_>) -> Result<(), BufferTooSmall> {
+        to.u8(self.mode as u8)?;
+        // No fault has the number 0.
+        to.u8(self.fault.map_or(0, |raised| raised.fault.number()))?;
+        let joint = self.fault.and_then(|raised| raised.joint);
+        to.u8(u8::from(joint.is_some()))?;
+        to.u8(joint.unwrap_or(0))?;
+        to.u32(self.age)?;
+        to.u32(self.grasped)
+    }
+
+    pub(crate) fn load(from: &mut Loader<'_>) -> Result<Self, SnapshotError> {
+        let mode = Mode::ALL.get(usize::from(from.u8()?)).copied();
+        let mode = mode.ok_or(SnapshotError::Malformed("no mode has this number"))?;
+        let (number, has_joint, joint) = (from.u8()?, from.flag()?, from.u8()?);
+        let fault = match number {
+            0 => None,
+            number => {
+                let fault = Fault::from_number(number);
+                let fault = fault.ok_or(SnapshotError::Malformed("no fault has this number"))?;
+                Some(Raised { fault, joint: has_joint.then_some(joint) })
+            }
+        };
+        Ok(Self { mode, fault, age: from.u32()?, grasped: from.u32()? })
     }
 
     /// The mode.

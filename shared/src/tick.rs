@@ -11,6 +11,7 @@
 //!
 //! Torques are those of the tick's end: what is computed from the counts of this tick acts from the next.
 
+use crate::buffer::BufferTooSmall;
 use crate::command::{Command, Grasp, Refusal};
 use crate::control::{GraspConfig, GraspLaw, Grip, Latch, Monitor};
 use crate::estimate::{Estimator, EstimatorConfig, Motion, Tracks};
@@ -22,6 +23,7 @@ use crate::math::Real;
 use crate::parameter::ParameterError;
 use crate::period::Period;
 use crate::supervisor::{Drive, Mode, Ramps, Supervisor, SupervisorConfig};
+use crate::telemetry::snapshot::{Loader, Saver, SnapshotError};
 use crate::telemetry::{List, Record};
 
 /// Everything that can be set, in SI units.
@@ -198,6 +200,66 @@ impl<T: Real, const J: usize, const F: usize> State<T, J, F> {
     }
 }
 
+impl<const J: usize, const F: usize> State<f32, J, F> {
+    /// Writes all that the ticks to come depend on, and returns the part of the buffer that it takes up.
+    ///
+    /// # Errors
+    /// If the buffer is too small; [`BYTES_PER_JOINT`](crate::telemetry::snapshot::BYTES_PER_JOINT) for each joint
+    /// always suffice.
+    pub fn save<'b>(
+        &self,
+        params: &Params<f32, J, F>,
+        buffer: &'b mut [u8],
+    ) -> Result<&'b mut [u8], BufferTooSmall> {
+        let (joints, fingertips) = (params.hand.joint_count(), params.hand.fingertip_count());
+        let mut to = Saver::new(buffer);
+        to.u8(joints as u8)?;
+        to.u8(fingertips as u8)?;
+        to.u32(self.ticks)?;
+        self.supervisor.save(&mut to)?;
+        to.f32(self.grasp.force_n)?;
+        to.f32(self.grasp.attitude_stiffness_nm)?;
+        self.watched.save(joints, &mut to)?;
+        self.tracks.save(joints, &mut to)?;
+        self.motion.save(joints, &mut to)?;
+        self.torques_nm.iter().take(joints).try_for_each(|&torque| to.f32(torque))?;
+        to.u8(u8::from(self.latch.is_some()))?;
+        if let Some(latch) = &self.latch {
+            latch.save(fingertips, &mut to)?;
+        }
+        to.finish()
+    }
+
+    /// Reads what [`Self::save`] wrote. The ticks that follow are those that followed there, to the bit.
+    ///
+    /// # Errors
+    /// What is wrong with the bytes.
+    pub fn load(params: &Params<f32, J, F>, bytes: &[u8]) -> Result<Self, SnapshotError> {
+        let mut from = Loader::new(bytes);
+        let (joints, fingertips) = (from.u8()?, from.u8()?);
+        let here = (params.hand.joint_count(), params.hand.fingertip_count());
+        if (usize::from(joints), usize::from(fingertips)) != here {
+            return Err(SnapshotError::OtherHand { joints, fingertips });
+        }
+        let (joints, fingertips) = here;
+        let mut state = Self::new();
+        state.ticks = from.u32()?;
+        state.supervisor = Supervisor::load(&mut from)?;
+        state.grasp = Firmness { force_n: from.f32()?, attitude_stiffness_nm: from.f32()? };
+        state.watched = Watched::load(joints, &mut from)?;
+        state.tracks = Tracks::load(joints, &mut from)?;
+        state.motion = Motion::load(joints, &mut from)?;
+        for torque in state.torques_nm.iter_mut().take(joints) {
+            *torque = from.f32()?;
+        }
+        if from.flag()? {
+            state.latch = Some(Latch::load(fingertips, &mut from)?);
+        }
+        from.finish()?;
+        Ok(state)
+    }
+}
+
 impl<T: Real, const J: usize, const F: usize> Default for State<T, J, F> {
     fn default() -> Self {
         Self::new()
@@ -312,6 +374,7 @@ pub fn tick<T: Real, const J: usize, const F: usize>(
         cycles: 0,
         late_ticks: state.watched.late_ticks(),
         dropped: 0,
+        decimation: 1,
         counts,
         torques_nm: List::first_of(action.torques_nm, joint_count),
         limiting: List::first_of(action.limiting, joint_count),

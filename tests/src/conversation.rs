@@ -48,8 +48,9 @@ impl Heard {
         match self.reply() {
             Reply::Identity { sequence, .. }
             | Reply::Answer { sequence, .. }
-            | Reply::Value { sequence, .. } => Some(sequence),
-            Reply::Record(_) => None,
+            | Reply::Value { sequence, .. }
+            | Reply::Burst { sequence, .. } => Some(sequence),
+            Reply::Record(_) | Reply::Snapshot(_) => None,
         }
     }
 

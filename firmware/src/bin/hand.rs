@@ -8,7 +8,7 @@
 mod app {
     use blindgrasp_firmware::board::{self, Buses, HandJoints};
     use blindgrasp_firmware::boot::Boot;
-    use blindgrasp_firmware::control::{Control, Timing, task};
+    use blindgrasp_firmware::control::{Control, HandBurst, Timing, task};
     use blindgrasp_firmware::link::Link;
     use blindgrasp_firmware::model::IMAGE_HAND;
     use blindgrasp_firmware::queue::{ControlEnd, Queues};
@@ -33,7 +33,7 @@ mod app {
         link: Link<'static, Line>,
     }
 
-    #[init(local = [bytes: Bytes = Bytes::new(), all_queues: Queues = Queues::new(), buses: Buses = Buses::new()])]
+    #[init(local = [bytes: Bytes = Bytes::new(), all_queues: Queues = Queues::new(), buses: Buses = Buses::new(), burst: HandBurst = HandBurst::new()])]
     fn init(mut cx: init::Context) -> (Shared, Local) {
         let device = cx.device;
         let mut boot = Boot::new(device.RCC, &device.DBGMCU);
@@ -57,7 +57,7 @@ mod app {
         schedule::start(&mut cx.core.SYST, period_us, boot.is_emulated());
         let local = Local {
             interrupt,
-            control: Control::new(controller),
+            control: Control::new(controller, cx.local.burst),
             joints,
             queues,
             last: Timing::default(),

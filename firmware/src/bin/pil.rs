@@ -17,7 +17,7 @@
 #[rtic::app(device = stm32f4xx_hal::pac, peripherals = true)]
 mod app {
     use blindgrasp_firmware::boot::Boot;
-    use blindgrasp_firmware::control::Control;
+    use blindgrasp_firmware::control::{Control, HandBurst};
     use blindgrasp_firmware::link::Port;
     use blindgrasp_firmware::model::IMAGE_PIL;
     use blindgrasp_firmware::pil::{Lockstep, Way};
@@ -38,7 +38,7 @@ mod app {
         is_emulated: bool,
     }
 
-    #[init(local = [bytes: Bytes = Bytes::new()])]
+    #[init(local = [bytes: Bytes = Bytes::new(), burst: HandBurst = HandBurst::new()])]
     fn init(mut cx: init::Context) -> (Shared, Local) {
         let device = cx.device;
         let mut boot = Boot::new(device.RCC, &device.DBGMCU);
@@ -48,7 +48,8 @@ mod app {
         let (interrupt, line) = serial::start(device.USART2, line_pins, cx.local.bytes, rcc)
             .expect("the board's baud rate can be had from its clock");
         schedule::start_cycle_counter(&mut cx.core.DCB, &mut cx.core.DWT);
-        let (control, is_emulated) = (Control::new(boot.device(&IMAGE_PIL)), boot.is_emulated());
+        let (control, is_emulated) =
+            (Control::new(boot.device(&IMAGE_PIL), cx.local.burst), boot.is_emulated());
         (Shared {}, Local { interrupt, line, control, timer: cx.core.SYST, is_emulated })
     }
 

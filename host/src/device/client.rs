@@ -332,6 +332,12 @@ impl<T: Transport> Client<T> {
                     (sequence, refused.map_or(Answer::Done, Answer::Refused))
                 }
                 Ok(Reply::Value { sequence, value, .. }) => (sequence, Answer::Value(value)),
+                Ok(Reply::Burst { sequence, .. }) => (sequence, Answer::Done),
+                // The image for processor in the loop sends none.
+                Ok(Reply::Snapshot(_)) => {
+                    self.traffic.frames_unexpected += 1;
+                    continue;
+                }
                 Err(_) => match other_interface(&self.payload) {
                     Some(theirs) => return Err(ClientError::OtherInterface { theirs }),
                     None => {
@@ -427,6 +433,7 @@ pub(super) fn in_words(packet: Option<&Packet>) -> String {
         Request::SetParameter { parameter, index, value } => format!("`{parameter}` [{index}] = {value}"),
         Request::GetParameter { parameter, index } => format!("what `{parameter}` [{index}] is"),
         Request::Telemetry { .. } => "`telemetry`".to_owned(),
+        Request::Burst { index } => format!("record {index} of the burst"),
         Request::Joints(_) => "the joints of a tick".to_owned(),
     }
 }

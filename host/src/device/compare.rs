@@ -143,7 +143,7 @@ fn same_answer(a: Option<&Answer>, b: Option<&Answer>) -> bool {
 }
 
 /// What of a record is not a real number.
-fn words(record: &Record) -> [(&'static str, String); 9] {
+fn words(record: &Record) -> [(&'static str, String); 10] {
     [
         ("mode", record.mode.words().to_owned()),
         ("fault", record.fault.map_or("none".to_owned(), |raised| raised.to_string())),
@@ -152,6 +152,7 @@ fn words(record: &Record) -> [(&'static str, String); 9] {
         ("reading", record.reading_failed.map_or("good".to_owned(), |raised| raised.to_string())),
         ("tick", record.tick.to_string()),
         ("sequence", record.sequence.to_string()),
+        ("decimation", record.decimation.to_string()),
         ("counts", format!("{:?}", record.counts)),
         ("limiting", format!("{:?}", record.limiting)),
     ]
@@ -196,6 +197,7 @@ mod tests {
             cycles: 0,
             late_ticks: 0,
             dropped: 0,
+            decimation: 1,
             counts: List::first_of([0; crate::MAX_JOINTS], 3),
             torques_nm: List::first_of(torques_nm, 3),
             limiting: List::default(),
@@ -240,7 +242,7 @@ mod tests {
         device.record.dropped = 1;
         assert_eq!(compare(&device, &host).bits_differ, 0);
         type Change = fn(&mut Turned);
-        let changes: [(&str, Change); 10] = [
+        let changes: [(&str, Change); 11] = [
             ("mode", |t| t.record.mode = Mode::Fault),
             ("fault", |t| t.record.fault = Some(Raised::of_hand(Fault::LinkLost))),
             ("answer to the command", |t| {
@@ -249,6 +251,7 @@ mod tests {
             }),
             ("reading", |t| t.record.reading_failed = Some(Raised::at(1, Fault::SampleMissing))),
             ("tick", |t| t.record.tick += 1),
+            ("decimation", |t| t.record.decimation = 2),
             ("sequence", |t| t.record.sequence += 1),
             ("counts", |t| t.record.counts = List::first_of([1; crate::MAX_JOINTS], 3)),
             ("number of torques", |t| t.record.torques_nm = List::default()),

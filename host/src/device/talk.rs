@@ -322,6 +322,8 @@ impl Talk {
             }
             Reply::Answer { sequence, refused } => (sequence, refused.map_or(Answer::Done, Answer::Refused)),
             Reply::Value { sequence, value, .. } => (sequence, Answer::Value(value)),
+            Reply::Burst { sequence, .. } => (sequence, Answer::Done),
+            Reply::Snapshot(_) => return Ok(()),
         };
         let Some(asked) = self.take_asked(sequence) else { return Ok(()) };
         if asked.again > 0 && answer == Answer::Refused(Refusal::Busy) {

@@ -10,12 +10,14 @@ use blindgrasp_shared::identity::{Clock, Identity, Image, ResetCause, UNITS};
 use blindgrasp_shared::link::message::Reply;
 use blindgrasp_shared::parameter::ParameterError;
 use blindgrasp_shared::telemetry::INTERFACE_VERSION;
+use blindgrasp_shared::telemetry::burst::Burst;
 use blindgrasp_shared::tick::{Params, State};
 
 /// A device on the host.
 #[derive(Clone, Debug)]
 pub struct Twin {
     device: Device<MAX_JOINTS, MAX_FINGERS>,
+    burst: Box<Burst<MAX_JOINTS>>,
 }
 
 impl Twin {
@@ -38,7 +40,7 @@ impl Twin {
             period_us: hand.config.period_us,
         };
         let identity = Identity { image, units: UNITS, clock, reset: ResetCause::Unknown, crash: None };
-        Ok(Self { device: Device::new(params, identity) })
+        Ok(Self { device: Device::new(params, identity), burst: Box::new(Burst::new()) })
     }
 
     /// One tick.
@@ -53,14 +55,15 @@ impl Twin {
             None => Reading::Counts(std::array::from_fn(|k| counts.get(k).copied().unwrap_or(0))),
         };
         let inputs = Inputs { reading, late: sample.late, cycles: 0, dropped: 0, packet: packet.cloned() };
-        let outputs = self.device.tick(&inputs);
+        let outputs = self.device.tick(&inputs, &mut self.burst);
         let answer = match outputs.reply {
-            None | Some(Reply::Record(_)) => None,
+            None | Some(Reply::Record(_) | Reply::Snapshot(_)) => None,
             Some(Reply::Identity { session, identity, .. }) => {
                 Some(Answer::Identity { session, firmware: Firmware::from(&identity) })
             }
             Some(Reply::Answer { refused, .. }) => Some(refused.map_or(Answer::Done, Answer::Refused)),
             Some(Reply::Value { value, .. }) => Some(Answer::Value(value)),
+            Some(Reply::Burst { .. }) => Some(Answer::Done),
         };
         Turned { answer, record: outputs.record }
     }

@@ -19,10 +19,12 @@
 //! - `V_st` has the constant `3 N K_st` added, so that it is zero at the latch and never negative: the energy is then
 //!   bounded for every `K_st`, and the condition of Eq. 49 is a sizing rule only.
 
+use crate::buffer::BufferTooSmall;
 use crate::hand::frame::{dot, product_transposed};
 use crate::hand::{Hand, Posture, Wrench};
 use crate::math::Real;
 use crate::parameter::ParameterError;
+use crate::telemetry::snapshot::{Loader, Saver, SnapshotError};
 use nalgebra::{Matrix3, Vector3};
 
 /// Gains of the grasp law, as a user gives them.
@@ -82,6 +84,20 @@ impl<T: Real, const F: usize> Latch<T, F> {
     /// Keeps the attitudes of a posture.
     pub fn of<const J: usize>(posture: &Posture<T, J, F>) -> Self {
         Self { attitudes: posture.attitudes }
+    }
+}
+
+impl<const F: usize> Latch<f32, F> {
+    pub(crate) fn save(&self, fingertips: usize, to: &mut Saver<'_>) -> Result<(), BufferTooSmall> {
+        self.attitudes.iter().take(fingertips).flatten().try_for_each(|&entry| to.f32(entry))
+    }
+
+    pub(crate) fn load(fingertips: usize, from: &mut Loader<'_>) -> Result<Self, SnapshotError> {
+        let mut attitudes = [Matrix3::identity(); F];
+        for entry in attitudes.iter_mut().take(fingertips).flatten() {
+            *entry = from.f32()?;
+        }
+        Ok(Self { attitudes })
     }
 }
 

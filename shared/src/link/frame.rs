@@ -26,7 +26,7 @@ pub fn encode<'a, M: Serialize + ?Sized>(
 }
 
 /// A frame that is being written.
-struct Writer<'a> {
+pub(super) struct Writer<'a> {
     buffer: &'a mut [u8],
     /// Where the code byte of the block in work belongs: it is written when the block is complete.
     code_at: usize,
@@ -36,8 +36,23 @@ struct Writer<'a> {
 }
 
 impl<'a> Writer<'a> {
-    fn new(buffer: &'a mut [u8]) -> Self {
+    pub(super) fn new(buffer: &'a mut [u8]) -> Self {
         Self { buffer, code_at: 0, next_at: 1, checksum: Checksum::START }
+    }
+
+    /// Adds a byte of the payload.
+    pub(super) fn push(&mut self, byte: u8) -> postcard::Result<()> {
+        self.checksum.advance(byte);
+        self.stuff(byte)
+    }
+
+    /// Adds the CRC, and ends the frame.
+    pub(super) fn finish(mut self) -> postcard::Result<&'a [u8]> {
+        self.checksum.bytes().into_iter().try_for_each(|byte| self.stuff(byte))?;
+        self.close_block()?;
+        self.put(self.next_at, END)?;
+        let buffer: &'a [u8] = self.buffer;
+        buffer.get(..=self.next_at).ok_or(postcard::Error::SerializeBufferFull)
     }
 
     fn put(&mut self, at: usize, byte: u8) -> postcard::Result<()> {
@@ -77,15 +92,10 @@ impl<'a> Flavor for Writer<'a> {
     type Output = &'a [u8];
 
     fn try_push(&mut self, byte: u8) -> postcard::Result<()> {
-        self.checksum.advance(byte);
-        self.stuff(byte)
+        self.push(byte)
     }
 
-    fn finalize(mut self) -> postcard::Result<&'a [u8]> {
-        self.checksum.bytes().into_iter().try_for_each(|byte| self.stuff(byte))?;
-        self.close_block()?;
-        self.put(self.next_at, END)?;
-        let buffer: &'a [u8] = self.buffer;
-        buffer.get(..=self.next_at).ok_or(postcard::Error::SerializeBufferFull)
+    fn finalize(self) -> postcard::Result<&'a [u8]> {
+        self.finish()
     }
 }

@@ -11,6 +11,7 @@ use crate::command::{Command, Refusal};
 use crate::fault::Raised;
 use crate::identity::Identity;
 use crate::settings::Parameter;
+use crate::telemetry::snapshot::Part;
 use crate::telemetry::{DecodeError, List, Record};
 use core::fmt;
 use serde::{Deserialize, Serialize};
@@ -63,6 +64,11 @@ pub enum Request<const J: usize> {
     },
     /// The joints of a hand that is elsewhere: do one tick with them. Only the image `pil` does.
     Joints(Sample<J>),
+    /// A record of the burst around the last fault.
+    Burst {
+        /// Which; 0 is the oldest.
+        index: u16,
+    },
 }
 
 /// Joints over the link.
@@ -76,7 +82,7 @@ pub struct Sample<const J: usize> {
     pub late: bool,
 }
 
-/// The parts of a record that need not be sent: a bit each.
+/// What of the telemetry is sent, and how: a bit each.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Signals(u8);
 
@@ -89,8 +95,20 @@ impl Signals {
     pub const TORQUES: Self = Self(1 << 1);
     /// What limits each joint.
     pub const LIMITING: Self = Self(1 << 2);
-    /// All of them.
+    /// Every part of a record.
     pub const ALL: Self = Self(0b111);
+    /// Records may come in the dense form.
+    pub const DENSE: Self = Self(1 << 3);
+    /// Snapshots of the state.
+    pub const STATE: Self = Self(1 << 4);
+    /// Everything, in the dense form: what a recording needs.
+    pub const FULL: Self = Self(0b1_1111);
+
+    /// These without others.
+    #[must_use]
+    pub const fn without(self, others: Self) -> Self {
+        Self(self.0 & !others.0)
+    }
 
     /// These and others.
     #[must_use]
@@ -105,7 +123,7 @@ impl Signals {
 
     /// Whether there is a meaning to every bit.
     pub const fn are_known(self) -> bool {
-        Self::ALL.contain(self)
+        Self::FULL.contain(self)
     }
 }
 
@@ -157,6 +175,19 @@ pub enum Reply<'a, const J: usize> {
     },
     /// What a tick did.
     Record(Record<f32, J>),
+    /// To `Burst`.
+    Burst {
+        /// Number of the request.
+        sequence: u16,
+        /// Which record it is.
+        index: u16,
+        /// How many there are.
+        count: u16,
+        /// The record; it is numbered by its tick.
+        record: Record<f32, J>,
+    },
+    /// A part of a snapshot.
+    Snapshot(Part),
 }
 
 impl<const J: usize> Packet<J> {
@@ -194,7 +225,8 @@ impl<'a, const J: usize> Reply<'a, J> {
     /// Bytes that suffice for every reply of up to `J` joints.
     pub const MOST_BYTES: usize = {
         let identity = 6 + Self::NAMES + 40;
-        let record = Record::<f32, J>::MOST_BYTES;
+        // Of a burst: with three numbers before it. A snapshot's part is shorter than an identity.
+        let record = 9 + Record::<f32, J>::MOST_BYTES;
         1 + if record > identity { record } else { identity }
     };
 
@@ -213,7 +245,13 @@ impl<'a, const J: usize> Reply<'a, J> {
 
 impl fmt::Display for Signals {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let names = [(Self::COUNTS, "counts"), (Self::TORQUES, "torques"), (Self::LIMITING, "limiting")];
+        let names = [
+            (Self::COUNTS, "counts"),
+            (Self::TORQUES, "torques"),
+            (Self::LIMITING, "limiting"),
+            (Self::DENSE, "dense"),
+            (Self::STATE, "state"),
+        ];
         let mut separator = "";
         for (_, name) in names.into_iter().filter(|&(signal, _)| self.contain(signal)) {
             write!(f, "{separator}{name}")?;

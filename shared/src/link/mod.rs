@@ -39,11 +39,15 @@
 
 mod checksum;
 mod frame;
+mod listener;
 pub mod message;
 mod receiver;
+mod sender;
 
 pub use frame::{encode, most_bytes};
+pub use listener::{HearError, Heard, Listener};
 pub use receiver::{Counters, FrameError, Receiver};
+pub use sender::Sender;
 
 /// Ends a frame, and is nowhere inside it.
 const END: u8 = 0;

@@ -18,9 +18,32 @@ impl<T, const N: usize> List<T, N> {
         Self { items, count: count.min(N) }
     }
 
+    /// No items; `filler` is what is in their places.
+    pub const fn empty(filler: T) -> Self
+    where
+        T: Copy,
+    {
+        Self { items: [filler; N], count: 0 }
+    }
+
+    /// How many items there are.
+    pub fn len(&self) -> usize {
+        self.count
+    }
+
+    /// Whether there are none.
+    pub fn is_empty(&self) -> bool {
+        self.count == 0
+    }
+
     /// The items.
     pub fn as_slice(&self) -> &[T] {
         self.items.get(..self.count).unwrap_or(&[])
+    }
+
+    /// The items, in order, to be changed.
+    pub fn iter_mut(&mut self) -> core::slice::IterMut<'_, T> {
+        self.items.get_mut(..self.count).unwrap_or(&mut []).iter_mut()
     }
 
     /// The items, in order.

@@ -8,7 +8,10 @@
 //! - With its parameters, the counts and the commands (which the answers repeat), a record has all that a replay needs
 //!   to compute everything else again, to the bit.
 
+pub mod burst;
+pub mod dense;
 mod list;
+pub mod snapshot;
 
 pub use list::List;
 
@@ -23,7 +26,7 @@ use serde::{Deserialize, Serialize};
 
 /// Version of everything that goes over the wire. Two ends talk when theirs are equal; it has nothing to do with the
 /// release's version.
-pub const INTERFACE_VERSION: u16 = 2;
+pub const INTERFACE_VERSION: u16 = 3;
 
 /// What one tick took in, decided and put out.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -60,6 +63,8 @@ pub struct Record<T, const J: usize> {
     pub late_ticks: u32,
     /// Records and answers that were lost since the start because a queue was full.
     pub dropped: u32,
+    /// Ticks from one record that is sent to the next, as it is now; 1 where none are sent.
+    pub decimation: u16,
     /// Encoder counts, one a joint; empty where angles came from elsewhere, or not at all.
     pub counts: List<i32, J>,
     /// Torques of the next tick, N m, one a joint.
@@ -91,14 +96,45 @@ impl fmt::Display for DecodeError {
 impl core::error::Error for DecodeError {}
 
 impl<const J: usize> Record<f32, J> {
+    /// A record of nothing.
+    pub const BLANK: Self = Self {
+        sequence: 0,
+        tick: 0,
+        mode: Mode::Disarmed,
+        fault: None,
+        answer: None,
+        events: Events::NONE,
+        reading_failed: None,
+        force_n: 0.0,
+        attitude_stiffness_nm: 0.0,
+        approach_potential_j: 0.0,
+        attitude_potential_j: 0.0,
+        energy_j: 0.0,
+        cycles: 0,
+        late_ticks: 0,
+        dropped: 0,
+        decimation: 0,
+        counts: List::empty(0),
+        torques_nm: List::empty(0.0),
+        limiting: List::empty(Limiting::NONE),
+    };
+
     /// Bytes that suffice for every record of up to `J` joints (`J` below 16,384).
     pub const MOST_BYTES: usize = {
         let (number, option, float) = (5, 1, 4);
         let fault = option + 1 + option + 1;
         let answer = option + Command::MOST_BYTES + option + 1;
-        let (mode, events) = (1, 1);
+        let (mode, events, decimation) = (1, 1, 3);
         let list = 2;
-        5 * number + mode + 2 * fault + answer + events + 5 * float + 3 * list + J * (number + float + 1)
+        5 * number
+            + decimation
+            + mode
+            + 2 * fault
+            + answer
+            + events
+            + 5 * float
+            + 3 * list
+            + J * (number + float + 1)
     };
 
     /// Writes the record into a buffer and returns the part that was written.
@@ -157,6 +193,7 @@ mod tests {
             cycles: 20_000,
             late_ticks: 2,
             dropped: 1,
+            decimation: 300,
             counts: List::first_of(counts, 3),
             torques_nm: List::first_of(torques, 3),
             limiting: List::first_of(limiting, 3),
@@ -167,7 +204,7 @@ mod tests {
         bytes.iter().map(|byte| format!("{byte:02x}")).collect()
     }
 
-    /// The bytes of interface version 2. If this fails, the interface has changed: raise [`INTERFACE_VERSION`], and
+    /// The bytes of interface version 3. If this fails, the interface has changed: raise [`INTERFACE_VERSION`], and
     /// only then replace the bytes.
     #[test]
     fn golden_bytes() {
@@ -187,12 +224,13 @@ mod tests {
             "a09c01",                     // cycles
             "02",                         // late ticks
             "01",                         // dropped
+            "ac02",                       // decimation
             "030001c0d102",               // counts
             "030000003f0000a0bf00000000", // torques
             "03000900",                   // limiting
         );
         let mut buffer = [0; Record::<f32, 3>::MOST_BYTES];
-        assert_eq!(INTERFACE_VERSION, 2);
+        assert_eq!(INTERFACE_VERSION, 3);
         assert_eq!(hex(example::<3>().encode(&mut buffer).unwrap()), golden);
         let mut buffer = [0; Record::<f32, 32>::MOST_BYTES];
         assert_eq!(hex(example::<32>().encode(&mut buffer).unwrap()), golden, "depends on the capacity");
@@ -216,7 +254,7 @@ mod tests {
         for refusal in Refusal::ALL {
             refusals.push(postcard::to_slice(refusal, &mut buffer).unwrap().to_vec());
         }
-        assert_eq!(bytes(refusals), "000102030405060708090a0b0c0d0e0f10111213");
+        assert_eq!(bytes(refusals), "000102030405060708090a0b0c0d0e0f101112131415");
         let mut faults = Vec::new();
         for fault in Fault::ALL {
             faults.push(postcard::to_slice(fault, &mut buffer).unwrap().to_vec());
@@ -232,6 +270,7 @@ mod tests {
             cycles: u32::MAX,
             late_ticks: u32::MAX,
             dropped: u32::MAX,
+            decimation: u16::MAX,
             answer: Some(Answer {
                 command: Command::Grasp(Grasp { force_n: Some(0.0), attitude_stiffness_nm: Some(0.0) }),
                 refused: Some(Refusal::Busy),
@@ -282,7 +321,7 @@ mod tests {
             mode in proptest::sample::select(&Mode::ALL[..]),
             fault in proptest::option::of((proptest::sample::select(Fault::ALL), any::<Option<u8>>())),
             (late, heartbeat) in any::<(bool, bool)>(),
-            (cycles, late_ticks, dropped) in any::<(u32, u32, u32)>(),
+            (cycles, late_ticks, dropped, decimation) in any::<(u32, u32, u32, u16)>(),
             answer in answers(),
             floats in any::<[f32; 5]>(),
             count in 0..=12_usize,
@@ -311,6 +350,7 @@ mod tests {
                 cycles,
                 late_ticks,
                 dropped,
+                decimation,
                 counts: List::first_of(counts, count),
                 torques_nm: List::first_of(torques, count),
                 limiting: List::first_of(limiting, count),
