@@ -45,8 +45,20 @@ impl HandModel {
     /// One line: where, which key, what is wrong, what to do.
     pub fn load(name_or_path: &str) -> std::result::Result<Self, SceneError> {
         let whole = Place::whole(name_or_path);
-        let mut tree =
-            Document::open(Kind::Hand, name_or_path, Path::new("")).map_err(|error| error.at(&whole))?.node;
+        let document = Document::open(Kind::Hand, name_or_path, Path::new(""));
+        Self::from_document(document.map_err(|error| error.at(&whole))?)
+    }
+
+    /// Reads a hand from a text. `source` is its name in errors.
+    ///
+    /// # Errors
+    /// As [`Self::load`].
+    pub fn parse(text: &str, source: &str) -> std::result::Result<Self, SceneError> {
+        Self::from_document(Document::parse(text, source, Path::new(""))?)
+    }
+
+    fn from_document(document: Document) -> std::result::Result<Self, SceneError> {
+        let mut tree = document.node;
         complete_hand(&mut tree);
         let file = read(&tree, "")?;
         Self::build(&file).map_err(|mut error| {
