@@ -4,6 +4,8 @@ pub(crate) mod console;
 pub(crate) mod flash;
 pub(crate) mod monitor;
 pub(crate) mod pil;
+mod ports;
+pub(crate) mod record;
 #[cfg(unix)]
 pub(crate) mod serve;
 pub(crate) mod sim;

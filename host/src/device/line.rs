@@ -7,7 +7,8 @@ use crate::MAX_JOINTS;
 use blindgrasp_shared::command::{Command, Refusal};
 use blindgrasp_shared::device::Outputs;
 use blindgrasp_shared::link::message::{self, Request, Signals, not_understood};
-use blindgrasp_shared::link::{Receiver, encode, most_bytes};
+use blindgrasp_shared::link::{Receiver, Sender, most_bytes};
+use blindgrasp_shared::telemetry::snapshot::Part;
 use std::collections::VecDeque;
 use std::time::Duration;
 
@@ -22,6 +23,12 @@ const REFUSALS: usize = 64;
 /// Bits of a byte on the line: one to start, one to stop.
 const BITS: f64 = 10.0;
 
+/// What the hand tells by itself.
+enum Telemetry {
+    Record(Box<Record>, Signals),
+    Part(Part),
+}
+
 /// The firmware's end of a line.
 pub struct Line {
     receiver: Receiver<{ Packet::MOST_BYTES + 4 }>,
@@ -30,7 +37,8 @@ pub struct Line {
     /// Requests that do not get to the tick.
     refusals: VecDeque<Reply>,
     answers: VecDeque<Reply>,
-    records: VecDeque<(Record, Signals)>,
+    records: VecDeque<Telemetry>,
+    sender: Sender<MAX_JOINTS>,
     dropped: u32,
     /// Bytes in a second; infinite if the line is as fast as one likes.
     bytes_per_s: f64,
@@ -51,6 +59,7 @@ impl Line {
             refusals: VecDeque::new(),
             answers: VecDeque::new(),
             records: VecDeque::new(),
+            sender: Sender::new(),
             dropped: 0,
             bytes_per_s: if baud == 0 { f64::INFINITY } else { f64::from(baud) / BITS },
             credit_bytes: 0.0,
@@ -102,9 +111,10 @@ impl Line {
                 self.dropped = self.dropped.saturating_add(1);
             }
         }
-        if let Some(signals) = outputs.telemetry {
+        let record = outputs.telemetry.map(|signals| Telemetry::Record(Box::new(outputs.record), signals));
+        for telemetry in record.into_iter().chain(outputs.part.map(Telemetry::Part)) {
             if self.records.len() < RECORDS {
-                self.records.push_back((outputs.record, signals));
+                self.records.push_back(telemetry);
             } else {
                 self.dropped = self.dropped.saturating_add(1);
             }
@@ -116,9 +126,9 @@ impl Line {
         self.dropped
     }
 
-    /// Sends what the line had time for since it was last asked.
-    pub fn send(&mut self, elapsed: Duration, to: &mut Vec<u8>) {
-        self.credit_bytes += self.bytes_per_s * elapsed.as_secs_f64();
+    /// Sends what the line has time for.
+    pub fn send(&mut self, time: Duration, to: &mut Vec<u8>) {
+        self.credit_bytes += self.bytes_per_s * time.as_secs_f64();
         while self.credit_bytes >= 1.0 {
             if self.sent == self.frame.len() && !self.load() {
                 // A line that has nothing to send does not save the time up.
@@ -133,22 +143,22 @@ impl Line {
         }
     }
 
-    /// Makes the next frame, if there is something to send: refusals, then answers, then records.
+    /// Makes the next frame, if there is something to send: refusals, then answers, then telemetry.
     fn load(&mut self) -> bool {
         let mut buffer = [0; most_bytes(Reply::MOST_BYTES)];
-        let reply = self.refusals.pop_front().or_else(|| self.answers.pop_front()).or_else(|| {
-            self.records.pop_front().map(|(mut record, signals)| {
-                record.keep(signals);
-                Reply::Record(record)
-            })
-        });
-        let Some(reply) = reply else { return false };
-        self.frame.clear();
-        self.sent = 0;
+        let sender = &mut self.sender;
+        let frame = match self.refusals.pop_front().or_else(|| self.answers.pop_front()) {
+            Some(reply) => sender.reply(&reply, &mut buffer),
+            None => match self.records.pop_front() {
+                Some(Telemetry::Record(record, signals)) => sender.record(&record, signals, &mut buffer),
+                Some(Telemetry::Part(part)) => sender.reply(&Reply::Snapshot(part), &mut buffer),
+                None => return false,
+            },
+        };
         // The buffer has room for the longest reply.
-        if let Ok(frame) = encode(&reply, &mut buffer) {
-            self.frame.extend_from_slice(frame);
-        }
+        self.frame.clear();
+        self.frame.extend_from_slice(frame.unwrap_or_default());
+        self.sent = 0;
         true
     }
 }

@@ -5,7 +5,7 @@
 //! - Processor in the loop, from the ground up: [`interrupt`], whether the user wants an end; [`transport`], bytes to and
 //!   from; `qemu`, the emulator as a process; [`client`], messages and answers; [`twin`], the firmware's double on the host;
 //!   [`compare`], whether they are one; [`pil`], a hand in a simulation whose controller is the firmware.
-//! - [`talk`]: a session with a hand whose joints are real.
+//! - [`talk`]: a session with a hand whose joints are real; [`recorder`]: a recording of it.
 //! - A hand for those who have none, from the ground up: [`simulated`], device and world, a tick at a time; [`line`](mod@line), the
 //!   firmware's queues; `pty`, a serial port that is none; `serve`, all of it in real time.
 
@@ -22,6 +22,7 @@ pub mod pil;
 pub mod pty;
 #[cfg(unix)]
 pub mod qemu;
+pub mod recorder;
 #[cfg(unix)]
 pub mod serve;
 pub mod simulated;

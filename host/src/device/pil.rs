@@ -144,14 +144,13 @@ impl Plan {
         Ok(Self { params: Params::new(scene.hand.cast(), &config)?, hand })
     }
 
-    /// The scene's parameters, with the faults that only a link and a clock can cause as the hand has them.
+    /// The scene's parameters, with the heartbeat that the hand wants of a host.
     ///
     /// # Errors
     /// The first that the controller refuses.
-    pub fn parameters(&self) -> Result<Params<f32, MAX_JOINTS, MAX_FINGERS>, ParameterError> {
-        let faults = self.hand.config.faults;
+    pub fn with_heartbeat(&self) -> Result<Params<f32, MAX_JOINTS, MAX_FINGERS>, ParameterError> {
         let mut config = *self.params.config();
-        (config.faults.heartbeat_ms, config.faults.late_ticks) = (faults.heartbeat_ms, faults.late_ticks);
+        config.faults.heartbeat_ms = self.hand.config.faults.heartbeat_ms;
         Params::new(self.params.hand().clone(), &config)
     }
 }

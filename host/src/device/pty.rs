@@ -14,6 +14,8 @@ use std::path::{Path, PathBuf};
 pub struct Pty {
     end: File,
     port: PathBuf,
+    /// Whether a program has opened the port, as far as is known.
+    attended: bool,
     lost_bytes: u64,
 }
 
@@ -30,7 +32,7 @@ impl Pty {
         fcntl(&pair.master, FcntlArg::F_SETFL(OFlag::O_NONBLOCK))?;
         let port = ttyname(&pair.slave)?;
         // Only programs hold the other end, so that it is known whether one does.
-        Ok(Self { end: File::from(pair.master), port, lost_bytes: 0 })
+        Ok(Self { end: File::from(pair.master), port, attended: false, lost_bytes: 0 })
     }
 
     /// What a program opens.
@@ -43,20 +45,26 @@ impl Pty {
     /// # Errors
     /// If the operating system refuses.
     pub fn receive(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
-        match self.end.read(buffer) {
+        let received = self.end.read(buffer);
+        self.attended = !received.as_ref().is_err_and(is_nobody);
+        match received {
             Err(error) if is_nobody(&error) || is_nothing(&error) => Ok(0),
             other => other,
         }
     }
 
-    /// Sends bytes. Nobody waits for a program that does not read: what it has no room for is lost, as on a wire.
+    /// Sends bytes, if anybody was there when it was last looked whether something came. Nobody waits for a program that
+    /// does not read: what it has no room for is lost, as on a wire.
     ///
     /// # Errors
     /// If the operating system refuses.
     pub fn send(&mut self, bytes: &[u8]) -> io::Result<()> {
+        if !self.attended {
+            // They must not wait for the next program.
+            return Ok(());
+        }
         let sent = match self.end.write(bytes) {
             Ok(sent) => sent,
-            // Without a program there is nothing to lose.
             Err(error) if is_nobody(&error) => return Ok(()),
             Err(error) if is_nothing(&error) => 0,
             Err(error) => return Err(error),

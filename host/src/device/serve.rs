@@ -13,9 +13,9 @@ use std::time::{Duration, Instant};
 pub struct Served {
     /// Ticks.
     pub ticks: u64,
-    /// Ticks that missed their deadline, the start of the next.
+    /// Ticks that began later than the next one should have.
     pub late: u64,
-    /// Starts that were lost because ticks were late.
+    /// Ticks that were given up, because the host stood still.
     pub missed: u64,
     /// Answers and records that the queues had no room for.
     pub dropped: u32,
@@ -23,10 +23,12 @@ pub struct Served {
     pub lost_bytes: u64,
 }
 
-/// Does ticks until the user wants an end, each at its time. `tell` is told the tick and what happened in it.
-///
-/// A tick that ends after the start of the next one is late, and the next one, which is told so, begins at once; further
-/// starts that have passed are lost, as in the firmware.
+/// How far the ticks may be behind before what is missing is given up: a host that slept is not made up for.
+const MOST_BEHIND: Duration = Duration::from_secs(1);
+
+/// Does ticks until the user wants an end, each at its time, or as soon after it as the host has the time: then it is told
+/// so, as a tick after a late one is in the firmware. Hand and line live in the time of the ticks, so that a host that is busy
+/// for a moment loses nothing. `tell` is told the tick and what happened in it.
 ///
 /// # Errors
 /// If the pseudo-terminal fails.
@@ -39,11 +41,19 @@ pub fn serve(
     let period = Duration::from_micros(hand.model.config.period_us.into());
     let mut served = Served::default();
     let (mut received, mut sent) = ([0; 512], Vec::new());
-    let mut last = Instant::now();
-    let mut start = last;
-    let mut late = false;
+    let mut start = Instant::now();
     while !interrupt::wanted() {
-        thread::sleep(start.saturating_duration_since(Instant::now()));
+        let mut behind = Instant::now().saturating_duration_since(start);
+        if behind.is_zero() {
+            thread::sleep(start.saturating_duration_since(Instant::now()));
+            behind = Instant::now().saturating_duration_since(start);
+        } else if behind > MOST_BEHIND {
+            let missed = behind.as_nanos() / period.as_nanos();
+            served.missed += missed as u64;
+            start += period * missed as u32;
+        }
+        let late = behind >= period;
+        served.late += u64::from(late);
         if line.listens() {
             let count = pty.receive(&mut received)?;
             line.take(&received[..count]);
@@ -51,9 +61,7 @@ pub fn serve(
         let turn = Turn { packet: line.packet(), late, dropped: line.dropped() };
         let (outputs, happened) = hand.turn(turn);
         line.post(outputs);
-        let now = Instant::now();
-        line.send(now - last, &mut sent);
-        last = now;
+        line.send(period, &mut sent);
         if !sent.is_empty() {
             pty.send(&sent)?;
             sent.clear();
@@ -63,14 +71,6 @@ pub fn serve(
         }
         served.ticks += 1;
         start += period;
-        let behind = Instant::now().saturating_duration_since(start);
-        late = !behind.is_zero();
-        if late {
-            let missed = behind.as_nanos() / period.as_nanos();
-            start += period * missed as u32;
-            served.late += 1;
-            served.missed += missed as u64;
-        }
     }
     (served.dropped, served.lost_bytes) = (line.dropped(), pty.lost_bytes());
     Ok(served)

@@ -18,6 +18,7 @@ use blindgrasp_shared::fault::{Fault, Raised};
 use blindgrasp_shared::identity::{Clock, Identity, Image, ResetCause, UNITS};
 use blindgrasp_shared::supervisor::Mode;
 use blindgrasp_shared::telemetry::INTERFACE_VERSION;
+use blindgrasp_shared::telemetry::burst::Burst;
 
 /// How long putting the object back takes, s.
 const PUT_BACK_S: f64 = 1.0;
@@ -84,6 +85,7 @@ pub struct SimulatedHand {
     /// The scene's hand.
     pub model: HandModel,
     device: Device<MAX_JOINTS, MAX_FINGERS>,
+    burst: Box<Burst<MAX_JOINTS>>,
     encoders: Encoders,
     /// Before a grasp.
     plant: Plant,
@@ -106,7 +108,8 @@ impl SimulatedHand {
     /// If no firmware can do what the scene wants, or it can't be simulated.
     pub fn new(scene: &Scene) -> Result<Self, SimulatedError> {
         let plan = Plan::new(scene)?;
-        let params = plan.parameters().map_err(PilError::from)?;
+        // Ticks may be late as often as they like: a host is no real-time computer, and what is simulated waits for it.
+        let params = plan.with_heartbeat().map_err(PilError::from)?;
         let model = plan.hand;
         let image = Image {
             interface_version: INTERFACE_VERSION,
@@ -124,6 +127,7 @@ impl SimulatedHand {
             Identity { image, units: UNITS, clock: Clock::External, reset: ResetCause::PowerOn, crash: None };
         Ok(Self {
             device: Device::new(params, identity),
+            burst: Box::new(Burst::new()),
             encoders: Encoders::new(scene),
             plant: sim::plant(scene)?,
             motors: Motors::new(scene),
@@ -147,7 +151,7 @@ impl SimulatedHand {
         let Turn { packet, late, dropped } = turn;
         // There is no processor whose cycles could be counted.
         let inputs = Inputs { reading: self.read(), late, cycles: 0, dropped, packet };
-        let outputs = self.device.tick(&inputs);
+        let outputs = self.device.tick(&inputs, &mut self.burst);
         let before_nm = std::mem::replace(&mut self.computed_nm, outputs.torques_nm);
         let wanted_nm = if self.delayed { before_nm } else { outputs.torques_nm };
         let happened = self.move_on(outputs.record.mode, &wanted_nm);
