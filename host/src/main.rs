@@ -19,6 +19,7 @@ enum Command {
     Pil(commands::pil::Arguments),
     Flash(commands::flash::Arguments),
     Console(commands::console::Arguments),
+    Monitor(commands::monitor::Arguments),
     Record(commands::record::Arguments),
     #[cfg(unix)]
     Serve(commands::serve::Arguments),
@@ -32,6 +33,7 @@ fn main() -> ExitCode {
         Command::Pil(arguments) => commands::pil::run(&arguments),
         Command::Flash(arguments) => commands::flash::run(&arguments),
         Command::Console(arguments) => commands::console::run(&arguments),
+        Command::Monitor(arguments) => commands::monitor::run(&arguments),
         Command::Record(arguments) => commands::record::run(&arguments),
         #[cfg(unix)]
         Command::Serve(arguments) => commands::serve::run(&arguments),
