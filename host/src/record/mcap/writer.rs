@@ -45,7 +45,6 @@ impl fmt::Display for Saved {
 }
 
 /// What went wrong, for good.
-#[derive(Debug)]
 struct Failure {
     problem: String,
 }
@@ -207,7 +206,7 @@ impl Writer {
         if let Some(crash) = &about.crash {
             self.log(device, at, Level::Error, "session", &format!("the device crashed before: {crash}"))?;
         }
-        Ok(())
+        self.settle(at)
     }
 
     /// The parameters in force: all of them at the beginning of a session, changed ones later.
@@ -223,7 +222,7 @@ impl Writer {
         let json = Setting::to_json(values).to_string();
         self.write(device, Kind::Parameters, at, json.as_bytes())?;
         self.devices[device.0].track.parameters(values);
-        Ok(())
+        self.settle(at)
     }
 
     /// The payload of a frame that was sent.
@@ -231,7 +230,8 @@ impl Writer {
     /// # Errors
     /// The recording has stopped.
     pub fn sent(&mut self, device: Device, at: Stamp, payload: &[u8]) -> Result<(), RecordingError> {
-        self.write(device, Kind::Sent, at, payload)
+        self.write(device, Kind::Sent, at, payload)?;
+        self.settle(at)
     }
 
     /// The payload of a good frame that came. A record is written decoded, too; so is, as an event, what it tells of mode,
@@ -251,6 +251,7 @@ impl Writer {
             Arrival::Reply => {}
             Arrival::Unusable => recorded.status.unusable += 1,
         }
+        self.settle(at)?;
         Ok(arrival)
     }
 
@@ -318,7 +319,8 @@ impl Writer {
         level: Level,
         words: &str,
     ) -> Result<(), RecordingError> {
-        self.log(device, at, level, "event", words)
+        self.log(device, at, level, "event", words)?;
+        self.settle(at)
     }
 
     /// The link was cut. What comes after has no connexion with what came before.
@@ -329,7 +331,8 @@ impl Writer {
         let recorded = &mut self.devices[device.0];
         recorded.track.restart();
         (recorded.mode, recorded.fault, recorded.dropped) = (None, None, None);
-        self.log(device, at, Level::Warning, GAP, words)
+        self.log(device, at, Level::Warning, GAP, words)?;
+        self.settle(at)
     }
 
     /// Writes and returns what became of the link since the last time; meant for every second.
@@ -350,6 +353,7 @@ impl Writer {
             _ => f64::NAN,
         };
         self.write(device, Kind::Link, at, &status.encode_to_vec())?;
+        self.settle(at)?;
         Ok(status)
     }
 
@@ -442,9 +446,13 @@ impl Writer {
         if !self.devices[device.0].announced {
             self.announce()?;
         }
-        self.write_to(kind.channel(device), at, data)?;
-        let due = self.since.get_or_insert(at);
-        if at.0.saturating_sub(due.0) >= CHECKPOINT_NS || self.pending >= CHECKPOINT_BYTES {
+        self.write_to(kind.channel(device), at, data)
+    }
+
+    /// Makes a checkpoint if it is time: between entries, never within what belongs together.
+    fn settle(&mut self, at: Stamp) -> Result<(), RecordingError> {
+        let since = self.since.get_or_insert(at);
+        if at.0.saturating_sub(since.0) >= CHECKPOINT_NS || self.pending >= CHECKPOINT_BYTES {
             self.checkpoint()?;
         }
         Ok(())
