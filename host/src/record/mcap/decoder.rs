@@ -3,11 +3,11 @@
 
 use super::about::{About, Setting};
 use super::clock::Clock;
-use super::listen::Listener;
 use super::reader::{Entry, What};
 use super::{RecordingError, Stamp};
 use crate::MAX_JOINTS;
 use blindgrasp_shared::estimate::{Estimator, Tracks};
+use blindgrasp_shared::link::Listener;
 use blindgrasp_shared::link::message::Reply;
 use blindgrasp_shared::period::Period;
 use blindgrasp_shared::telemetry::{self, INTERFACE_VERSION, List};
@@ -46,7 +46,7 @@ pub struct Decoded {
 impl Decoded {
     /// Ticks from one sent record to the next.
     pub fn decimation(&self) -> u16 {
-        1
+        self.record.decimation
     }
 }
 

@@ -25,7 +25,6 @@ mod clock;
 mod decoder;
 mod error;
 mod file;
-mod listen;
 mod message;
 mod reader;
 mod salvage;

@@ -29,19 +29,24 @@ pub(super) struct Signal {
 }
 
 macro_rules! signals {
-    ($(#[$doc:meta])* $module:ident: $($constant:ident = $number:literal, $name:literal, $kind:ident, $unit:literal, $words:literal, $resolution:expr;)*) => {
+    ($(#[$doc:meta])* $module:ident: $($constant:ident = $number:literal, $name:literal, $kind:ident, $unit:literal, $words:literal, $resolution:ident;)*) => {
         $(#[$doc])*
         pub(super) mod $module {
-            use super::{EXACT, HALF, Signal, Type};
+            use super::{Signal, Type};
             $(pub(in super::super) const $constant: u32 = $number;)*
             pub(in super::super) const ALL: &[Signal] = &[$(Signal {
-                number: $number, name: $name, kind: Type::$kind, unit: $unit, words: $words, resolution: $resolution,
+                number: $constant, name: $name, kind: Type::$kind, unit: $unit, words: $words, resolution: super::$resolution,
             }),*];
         }
     };
 }
 
-const EXACT: &str = EXACT;
+const EXACT: &str = "exact";
+const TICK: &str = "a tick";
+const CYCLES: &str = "4 in dense records, 1 in full ones";
+const FRACTION: &str = "a fraction of a count";
+const ESTIMATOR: &str = "see shared/src/estimate.rs";
+const NOTHING: &str = "";
 const HALF: &str = "11 significant bits (IEEE 754 binary16) in dense records, exact in full ones";
 
 #[rustfmt::skip]
@@ -50,7 +55,7 @@ signals! {
     tick:
     SEQUENCE            =  1, "sequence",             Uint32, "",       "Number of the record, one more from record to record, modulo 2^32", EXACT;
     TICK                =  2, "tick",                 Uint32, "",       "Number of the tick since the device's start, modulo 2^32", EXACT;
-    TIME_S              =  3, "time_s",               Double, "s",      "Time of the tick since the device's start, on the device's clock", "a tick";
+    TIME_S              =  3, "time_s",               Double, "s",      "Time of the tick since the device's start, on the device's clock", TICK;
     MODE                =  4, "mode",                 Enum,   "",       "Mode; its name is the word", EXACT;
     FAULT               =  5, "fault",                Enum,   "",       "The fault that the hand is in; its name is the word, its value the number", EXACT;
     FAULT_JOINT         =  6, "fault_joint",          String, "",       "The joint of the fault, if it is one's", EXACT;
@@ -64,12 +69,12 @@ signals! {
     APPROACH_J          = 14, "approach_potential_j", Float,  "J",      "Potential V_s of the approach", HALF;
     ATTITUDE_J          = 15, "attitude_potential_j", Float,  "J",      "Potential V_st of the attitudes, above its least value", HALF;
     ENERGY_J            = 16, "energy_j",             Float,  "J",      "Work of the joints in the last second (fading)", HALF;
-    CYCLES              = 17, "cycles",               Uint32, "cycles", "Processor cycles of reading and writing the joints in the tick before; 0 where nothing counts them", "4 in dense records, 1 in full ones";
+    CYCLES              = 17, "cycles",               Uint32, "cycles", "Processor cycles of reading and writing the joints in the tick before; 0 where nothing counts them", CYCLES;
     LATE_TICKS          = 18, "late_ticks",           Uint32, "",       "Ticks that were late since the start", EXACT;
     DROPPED             = 19, "dropped",              Uint32, "",       "Records and answers that the device lost since its start because a queue was full", EXACT;
     DECIMATION          = 20, "decimation",           Uint32, "ticks",  "Ticks from one sent record to the next", EXACT;
     LOST_BEFORE         = 21, "lost_before",          Uint64, "",       "Records missing between the one before and this one", EXACT;
-    JOINTS              = 22, "joints",               Message, "",      "The joints by name", "";
+    JOINTS              = 22, "joints",               Message, "",      "The joints by name", NOTHING;
 }
 
 #[rustfmt::skip]
@@ -77,8 +82,8 @@ signals! {
     /// Of a joint.
     joint:
     COUNT               =  1, "count",                Sint32, "counts", "Encoder count; absent where it is not known", EXACT;
-    ANGLE_RAD           =  2, "angle_rad",            Float,  "rad",    "Angle as the controller's estimator sees it; NaN where it is not known", "a fraction of a count";
-    SPEED_RAD_S         =  3, "speed_rad_s",          Float,  "rad/s",  "Speed as the controller's estimator sees it; NaN where it is not known", "see shared/src/estimate.rs";
+    ANGLE_RAD           =  2, "angle_rad",            Float,  "rad",    "Angle as the controller's estimator sees it; NaN where it is not known", FRACTION;
+    SPEED_RAD_S         =  3, "speed_rad_s",          Float,  "rad/s",  "Speed as the controller's estimator sees it; NaN where it is not known", ESTIMATOR;
     TORQUE_NM           =  4, "torque_nm",            Float,  "N m",    "Torque of the next tick; NaN where it is not known", HALF;
     BY_TORQUE           =  5, "limited_by_torque",    Bool,   "",       "Whether the torque limit acts", EXACT;
     BY_SLEW             =  6, "limited_by_slew",      Bool,   "",       "Whether the slew limit acts", EXACT;
