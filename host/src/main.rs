@@ -21,6 +21,9 @@ enum Command {
     Console(commands::console::Arguments),
     Replay(commands::replay::Arguments),
     Export(commands::export::Arguments),
+    Record(commands::record::Arguments),
+    #[cfg(unix)]
+    Serve(commands::serve::Arguments),
 }
 
 fn main() -> ExitCode {
@@ -31,6 +34,9 @@ fn main() -> ExitCode {
         Command::Console(arguments) => commands::console::run(&arguments),
         Command::Replay(arguments) => commands::replay::run(&arguments),
         Command::Export(arguments) => commands::export::run(&arguments),
+        Command::Record(arguments) => commands::record::run(&arguments),
+        #[cfg(unix)]
+        Command::Serve(arguments) => commands::serve::run(&arguments),
     };
     match outcome {
         Ok(commands::Outcome::Shown) => ExitCode::SUCCESS,

@@ -4,7 +4,11 @@ pub(crate) mod console;
 pub(crate) mod export;
 pub(crate) mod flash;
 pub(crate) mod pil;
+mod ports;
+pub(crate) mod record;
 pub(crate) mod replay;
+#[cfg(unix)]
+pub(crate) mod serve;
 pub(crate) mod sim;
 
 use anyhow::{Context, bail};
