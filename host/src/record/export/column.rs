@@ -325,7 +325,7 @@ mod tests {
     fn what_no_column_is_called_is_told_with_what_there_is() {
         let error = names(&["tick", "angel_rad"]).unwrap_err();
         assert!(error.contains("`angel_rad`; did you mean `angle_rad`?"), "{error}");
-        assert!(error.contains("JOINT.torque_nm; joints: thumb-1, thumb-2, index-1"), "{error}");
+        assert!(error.contains("JOINT.limited_by; joints: thumb-1, thumb-2, index-1"), "{error}");
         assert!(names(&["pinky.*"]).is_err());
     }
 

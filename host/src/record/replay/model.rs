@@ -80,21 +80,26 @@ mod tests {
     use super::*;
     use crate::scene::HandFile;
     use blindgrasp_shared::fault::FaultConfig;
+    use blindgrasp_shared::identity::{Clock, Identity, Image, ResetCause, UNITS};
     use blindgrasp_shared::limit::LimitConfig;
 
     #[test]
     fn any_configuration_comes_back_from_its_parameters() {
         let model = HandModel::load("three-finger").unwrap();
         let file = HandFile::load("three-finger").unwrap();
-        let about = About {
-            hand: model.name.clone(),
+        let image = Image {
+            interface_version: 3,
+            kind: "hand",
+            hand: &model.name,
             hand_hash: model.hash(),
+            firmware_version: "0.1.0",
+            build_hash: 1,
             joint_count: 12,
             fingertip_count: 3,
             period_us: 1000,
-            ..About::default()
-        }
-        .with_hand(&file);
+        };
+        let (clock, reset) = (Clock::External, ResetCause::PowerOn);
+        let about = About::of(&Identity { image, units: UNITS, clock, reset, crash: None }).with_hand(&file);
         let recorded = Model::new(&about, None).unwrap();
         let mut configs = vec![model.config];
         // Everything that can be switched is on in the hand's file: off, in turns.
