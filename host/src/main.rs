@@ -22,6 +22,7 @@ enum Command {
     Record(commands::record::Arguments),
     #[cfg(unix)]
     Serve(commands::serve::Arguments),
+    Monitor(commands::monitor::Arguments),
 }
 
 fn main() -> ExitCode {
@@ -33,6 +34,7 @@ fn main() -> ExitCode {
         Command::Record(arguments) => commands::record::run(&arguments),
         #[cfg(unix)]
         Command::Serve(arguments) => commands::serve::run(&arguments),
+        Command::Monitor(arguments) => commands::monitor::run(&arguments),
     };
     match outcome {
         Ok(commands::Outcome::Shown) => ExitCode::SUCCESS,

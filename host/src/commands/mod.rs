@@ -2,6 +2,7 @@
 
 pub(crate) mod console;
 pub(crate) mod flash;
+pub(crate) mod monitor;
 pub(crate) mod pil;
 mod ports;
 pub(crate) mod record;
