@@ -169,10 +169,10 @@ pub fn ports_in_words() -> String {
 
 fn ports(known: &[PathBuf]) -> String {
     if known.is_empty() {
-        return "this machine has none".to_owned();
+        return "this machine has no serial ports".to_owned();
     }
     let names: Vec<String> = known.iter().map(|path| path.display().to_string()).collect();
-    format!("this machine has {}", names.join(", "))
+    format!("this machine has the serial ports {}", names.join(", "))
 }
 
 impl SerialPort {

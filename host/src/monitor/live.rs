@@ -4,19 +4,21 @@
 //! answers then. But a heartbeat says that somebody is watching: when nobody has fetched the news for a while, because the
 //! terminal takes nothing any more, it ends, and the hand lets go.
 
+use super::exchange::Exchange;
 use super::model::{Level, News, Session};
 use crate::device::client::{Answer, Firmware, Request};
+use crate::device::recorder::Recorder;
 use crate::device::talk::{self, Event, LineError, Talk, TalkError};
 use crate::device::transport::{self, Transport, TransportError};
+use crate::record::mcap::RecordingError;
 use crate::scene::HandModel;
 use blindgrasp_shared::command::{self, Command, Refusal};
-use blindgrasp_shared::event;
 use blindgrasp_shared::link::message::Signals;
 use blindgrasp_shared::settings::Parameter;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::mpsc::{self, Receiver, RecvTimeoutError, Sender, TryRecvError};
-use std::thread;
+use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
 /// How long nothing is looked at but the line.
@@ -37,6 +39,8 @@ pub enum Told {
     News(Duration, News),
     /// What became of a stop: whether the hand has confirmed it.
     Stopped(bool),
+    /// The recording has ended too early.
+    Unrecorded(RecordingError),
 }
 
 /// The end of the line that is watched.
@@ -44,16 +48,18 @@ pub struct Live {
     begun: Instant,
     orders: Sender<Request>,
     told: Receiver<Told>,
+    thread: JoinHandle<()>,
     /// When the news were fetched last, ms since the begin.
     fetched_ms: Arc<AtomicU64>,
 }
 
 impl Live {
-    /// Opens a line, and says hello all the time from then on. `hand` is the file of the hand, if it is not built in.
+    /// Opens a line, and says hello all the time from then on. `hand` is the file of the hand, if it is not built in;
+    /// `recorder` writes down what goes over the line.
     ///
     /// # Errors
     /// If the line can't be opened now.
-    pub fn open(port: &str, hand: Option<&str>) -> Result<Self, LineError> {
+    pub fn open(port: &str, hand: Option<&str>, recorder: Option<Recorder>) -> Result<Self, LineError> {
         let begun = Instant::now();
         let (orders, asked) = mpsc::channel();
         let (tell, told) = mpsc::channel();
@@ -66,12 +72,13 @@ impl Live {
             asked,
             tell,
             fetched_ms: Arc::clone(&fetched_ms),
+            recorder,
         };
-        thread::spawn(move || follower.follow(&opened));
+        let thread = thread::spawn(move || follower.follow(&opened));
         match is_open.recv() {
             Ok(Err(error)) => Err(error),
             // Without an answer the thread has ended, which is found out when news are fetched.
-            Ok(Ok(())) | Err(_) => Ok(Self { begun, orders, told, fetched_ms }),
+            Ok(Ok(())) | Err(_) => Ok(Self { begun, orders, told, thread, fetched_ms }),
         }
     }
 
@@ -84,6 +91,13 @@ impl Live {
     pub fn ask(&self, command: Command) {
         // A thread that has ended is noticed by who fetches the news.
         let _ = self.orders.send(Request::Command(command));
+    }
+
+    /// Ends the heartbeat, and what is recorded.
+    pub fn close(self) {
+        drop(self.orders);
+        // If it has panicked, that is told already.
+        let _ = self.thread.join();
     }
 
     /// What was told since, if the line is still being followed.
@@ -112,11 +126,12 @@ struct Follower {
     asked: Receiver<Request>,
     tell: Sender<Told>,
     fetched_ms: Arc<AtomicU64>,
+    recorder: Option<Recorder>,
 }
 
 impl Follower {
     /// Until nobody wants the line any more.
-    fn follow(self, opened: &Sender<Result<(), LineError>>) {
+    fn follow(mut self, opened: &Sender<Result<(), LineError>>) {
         let mut is_first = true;
         loop {
             let why = match talk::open(&self.port) {
@@ -126,7 +141,7 @@ impl Follower {
                     }
                     match self.talk(&mut *line) {
                         Ok(why) => why,
-                        Err(Over) => return,
+                        Err(Over) => break,
                     }
                 }
                 Err(error) if is_first => {
@@ -135,16 +150,30 @@ impl Follower {
                 }
                 Err(error) => error.to_string(),
             };
+            self.record(|recorder| recorder.cut(&why, Instant::now()));
             self.news(News::Cut(why));
             if self.pause().is_err() {
-                return;
+                break;
             }
+        }
+        self.record(|recorder| recorder.finish(Instant::now()));
+    }
+
+    /// Writes something down, as long as that can be done; a hand is not let go for the sake of a disk.
+    fn record(&mut self, write: impl FnOnce(&mut Recorder) -> Result<(), RecordingError>) {
+        if let Some(recorder) = &mut self.recorder
+            && let Err(error) = write(recorder)
+        {
+            self.recorder = None;
+            self.note(Level::Error, format!("the recording has ended: {error}"));
+            self.send(Told::Unrecorded(error));
         }
     }
 
     /// Talks until the line is lost; returns why.
-    fn talk(&self, line: &mut dyn Transport) -> Result<String, Over> {
-        let mut talk = Talk::new(talk::PATIENCE, Instant::now());
+    fn talk(&mut self, line: &mut dyn Transport) -> Result<String, Over> {
+        let mut talk = Talk::new(talk::PATIENCE, Instant::now()).tapped();
+        let mut exchange = Exchange::default();
         let mut buffer = [0; 4096];
         let (mut counted, mut count_at) = (*talk.traffic(), Instant::now());
         loop {
@@ -153,8 +182,14 @@ impl Follower {
                 return Ok(self.lost(&error));
             }
             while let Some(event) = talk.event() {
-                self.hear(event, &mut talk, now);
+                if matches!(event, Event::Open { .. }) {
+                    // Who joins a stream begins in the middle of a frame, which is no damage.
+                    counted.frames_damaged = talk.traffic().frames_damaged;
+                }
+                self.record(|recorder| recorder.take(&event, &mut talk, now));
+                self.hear(event, &mut talk, &mut exchange, now);
             }
+            self.record(|recorder| recorder.turn(&mut talk, now).map(|_| ()));
             if self.is_unwatched() {
                 return Ok("nobody has watched for 5 s, so that the heartbeat was ended".into());
             }
@@ -175,6 +210,7 @@ impl Follower {
                 let traffic = *talk.traffic();
                 let bytes = traffic.bytes_received - counted.bytes_received;
                 let damaged = traffic.frames_damaged - counted.frames_damaged;
+                let damaged = if exchange.session().is_some() { damaged } else { 0 };
                 self.news(News::Traffic { bytes, damaged });
                 (counted, count_at) = (traffic, now + TRAFFIC);
             }
@@ -229,9 +265,18 @@ impl Follower {
         }
     }
 
-    fn hear(&self, event: Event, talk: &mut Talk, now: Instant) {
+    fn hear(&self, event: Event, talk: &mut Talk, exchange: &mut Exchange, now: Instant) {
         match event {
-            Event::Open { firmware, period_us } => self.open(firmware, period_us, talk, now),
+            Event::Sent(payload) => exchange.sent(&payload),
+            Event::Received(payload) => {
+                if exchange.received(&payload) {
+                    self.news(News::Heartbeat);
+                }
+            }
+            Event::Open { firmware, period_us } => {
+                ask_for_everything(&firmware, talk, now);
+                self.greet(firmware, period_us, exchange.session());
+            }
             Event::StartedAnew => {
                 let words = "the device was reset: it has forgotten the session, and what was set";
                 self.news(News::Cut(words.into()));
@@ -255,12 +300,9 @@ impl Follower {
             }
             // What the monitor itself wants to know.
             Event::Unsent(request) | Event::Unanswered(request) => talk.ask(request, now),
-            Event::Record(record) => {
-                if record.events.contains(event::Event::Heartbeat) {
-                    self.news(News::Heartbeat);
-                }
-                self.news(News::Record(Box::new(record)));
-            }
+            Event::Record(record) => self.news(News::Record(Box::new(record))),
+            // The traffic counts damage, and nothing is asked aside.
+            Event::Damaged | Event::Aside(..) => {}
         }
     }
 
@@ -291,17 +333,13 @@ impl Follower {
         }
     }
 
-    fn open(&self, firmware: Firmware, period_us: u32, talk: &mut Talk, now: Instant) {
-        talk.ask(Request::Telemetry { decimation: 1, signals: Signals::ALL }, now);
-        let heartbeat = Request::GetParameter { parameter: Parameter::HeartbeatTime, index: 0 };
-        let joints = 0..u8::try_from(firmware.joint_count).unwrap_or(u8::MAX);
-        let torques = joints.map(|index| Request::GetParameter { parameter: Parameter::TorqueLimit, index });
-        for request in std::iter::once(heartbeat).chain(torques) {
-            talk.ask(request, now);
-        }
-        let hand = known_hand(self.hand.as_deref(), &firmware);
-        self.note(Level::Info, format!("a session: {}", firmware.words));
-        self.news(News::Open(Box::new(Session { number: None, firmware, period_us, hand })));
+    fn greet(&self, firmware: Firmware, period_us: u32, number: Option<u16>) {
+        let Firmware { words, hand: hand_name, hand_hash, joint_count, .. } = firmware;
+        let hand = known_hand(self.hand.as_deref(), &hand_name, hand_hash);
+        self.note(Level::Info, format!("a session: {words}"));
+        let firmware = words.split(',').next().unwrap_or_default().to_owned();
+        let session = Session { number, firmware, hand_name, hand_hash, joint_count, period_us, hand };
+        self.news(News::Open(Box::new(session)));
     }
 
     fn note(&self, level: Level, words: String) {
@@ -318,14 +356,23 @@ impl Follower {
     }
 }
 
+/// Every tick's record, and the parameters that are shown.
+fn ask_for_everything(firmware: &Firmware, talk: &mut Talk, now: Instant) {
+    talk.ask(Request::Telemetry { decimation: 1, signals: Signals::FULL }, now);
+    talk.ask(Request::GetParameter { parameter: Parameter::HeartbeatTime, index: 0 }, now);
+    for index in 0..u8::try_from(firmware.joint_count).unwrap_or(u8::MAX) {
+        talk.ask(Request::GetParameter { parameter: Parameter::TorqueLimit, index }, now);
+    }
+}
+
 /// The hand that a firmware was built with: from its file, or from those that are built in.
 ///
 /// # Errors
 /// Why it is not known, and what to do, in words.
-pub fn known_hand(file: Option<&str>, firmware: &Firmware) -> Result<Box<HandModel>, String> {
-    let file = file.unwrap_or(&firmware.hand);
+pub(super) fn known_hand(file: Option<&str>, name: &str, hash: u32) -> Result<Box<HandModel>, String> {
+    let file = file.unwrap_or(name);
     match HandModel::load(file) {
-        Ok(hand) if hand.hash() == firmware.hand_hash => Ok(Box::new(hand)),
+        Ok(hand) if hand.hash() == hash => Ok(Box::new(hand)),
         Ok(_) => {
             Err(format!("the firmware was built with another hand than `{file}`; name its file with --hand"))
         }

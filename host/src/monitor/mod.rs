@@ -5,9 +5,11 @@
 //! [`view`] draws the model into a buffer of characters. [`input`] makes intents of keys and asks before what can move or
 //! drop something. What takes time from a terminal or the clock is in the command alone.
 
+mod exchange;
 pub mod history;
 pub mod input;
 pub mod live;
 pub mod model;
+pub mod playback;
 pub mod rate;
 pub mod view;

@@ -5,7 +5,7 @@
 
 use super::history::{History, Range};
 use super::rate::Rate;
-use crate::device::client::{Firmware, Record};
+use crate::device::client::Record;
 use crate::device::transport::BAUD;
 use crate::scene::HandModel;
 use blindgrasp_shared::command::{Command, Refusal};
@@ -41,8 +41,14 @@ pub enum Level {
 pub struct Session {
     /// Its number, if that is known.
     pub number: Option<u16>,
-    /// The firmware.
-    pub firmware: Firmware,
+    /// The firmware, in a few words.
+    pub firmware: String,
+    /// Name of its hand.
+    pub hand_name: String,
+    /// CRC-32 of its hand's model and configuration.
+    pub hand_hash: u32,
+    /// Joints of its hand.
+    pub joint_count: usize,
     /// Time from one of its ticks to the next, us.
     pub period_us: u32,
     /// Its hand, or why that is not known.
@@ -261,10 +267,10 @@ impl Model {
         self.counts.clear();
         let hand = session.hand.as_ref().ok();
         // As built; what is set since, the device will tell.
-        self.torque_limits_nm = (0..session.firmware.joint_count)
+        self.torque_limits_nm = (0..session.joint_count)
             .map(|joint| hand?.config.limits.torque_nm.as_ref()?.get(joint).copied())
             .collect();
-        let joints = |session: &Session| (session.firmware.hand_hash, session.firmware.joint_count);
+        let joints = |session: &Session| (session.hand_hash, session.joint_count);
         if self.session.as_ref().is_some_and(|before| joints(before) != joints(&session)) {
             self.record = None;
             self.history.clear();
@@ -307,6 +313,10 @@ impl Model {
 
     fn look(&mut self, at: Duration, record: Record) {
         self.records.add(at, 1);
+        if self.session.is_some() {
+            // A recording can go on after a gap without another session.
+            self.link = Link::Open;
+        }
         // A number that is not ahead is that of a device that counts anew.
         let ahead = self.sequence.map(|last| record.sequence.wrapping_sub(last));
         if let Some(ahead) = ahead.filter(|ahead| (1..1 << 31).contains(ahead)) {
@@ -460,7 +470,7 @@ impl Model {
 
     /// Number of joints, as far as it is known.
     pub fn joint_count(&self) -> usize {
-        self.session.as_ref().map_or(0, |session| session.firmware.joint_count)
+        self.session.as_ref().map_or(0, |session| session.joint_count)
     }
 
     /// The joints.
@@ -538,7 +548,6 @@ pub(super) mod tests {
     use super::*;
     use blindgrasp_shared::event::Events;
     use blindgrasp_shared::fault::{Fault, Raised};
-    use blindgrasp_shared::identity::{Clock, ResetCause};
     use blindgrasp_shared::telemetry::List;
 
     pub(crate) fn ms(ms: u64) -> Duration {
@@ -547,18 +556,17 @@ pub(super) mod tests {
 
     pub(crate) fn session(with_hand: bool) -> News {
         let hand = HandModel::load("three-finger").expect("the hand");
-        let firmware = Firmware {
-            words: "blindgrasp 0.1.0 (25c42b05), image `hand` for the hand `three-finger`".into(),
-            kind: "hand".into(),
-            hand: "three-finger".into(),
-            hand_hash: hand.hash(),
-            joint_count: 12,
-            clock: Clock::External,
-            reset: ResetCause::PowerOn,
-            crash: None,
-        };
+        let hand_hash = hand.hash();
         let hand = if with_hand { Ok(Box::new(hand)) } else { Err("it is not built in".into()) };
-        News::Open(Box::new(Session { number: Some(3), firmware, period_us: 1000, hand }))
+        News::Open(Box::new(Session {
+            number: Some(3),
+            firmware: "blindgrasp 0.1.0 (25c42b05)".into(),
+            hand_name: "three-finger".into(),
+            hand_hash,
+            joint_count: 12,
+            period_us: 1000,
+            hand,
+        }))
     }
 
     pub(crate) fn record(tick: u32) -> Record {
@@ -581,6 +589,7 @@ pub(super) mod tests {
             cycles: 16_800,
             late_ticks: 0,
             dropped: 0,
+            decimation: 1,
             counts: List::first_of(counts, 12),
             torques_nm: List::first_of([0.25; crate::MAX_JOINTS], 12),
             limiting: List::first_of([Limiting::NONE; crate::MAX_JOINTS], 12),

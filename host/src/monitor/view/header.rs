@@ -125,6 +125,10 @@ fn link<'a>(model: &'a Model, screen: &Screen<'a>, now: Duration, width: usize) 
     let share = 100.0 * model.line_share(now);
     let mut parts = vec![
         Span::raw(format!("{:.0} records/s", model.records_s(now))),
+        match record.decimation {
+            0 | 1 => Span::raw("each tick"),
+            every => Span::styled(format!("only 1 tick in {every}"), palette.warning()),
+        },
         Span::raw(format!("{:.1} kB/s", 1e-3 * model.bytes_s(now))),
         Span::raw(format!("{share:.0} % of the line")),
         counted("lost", model.lost()),
@@ -149,12 +153,11 @@ fn identity<'a>(model: &'a Model, screen: &Screen<'a>, width: usize) -> Line<'a>
         Source::Recording { file, device, .. } => vec![Span::raw(format!("{file}, {device}"))],
     };
     if let Some(session) = model.session() {
-        parts.insert(0, Span::styled(format!("hand {}", session.firmware.hand), palette.title()));
+        parts.insert(0, Span::styled(format!("hand {}", session.hand_name), palette.title()));
         if let Some(number) = session.number {
             parts.push(Span::raw(format!("session {number}")));
         }
-        let words = &session.firmware.words;
-        parts.push(Span::raw(words.split(',').next().unwrap_or(words)));
+        parts.push(Span::raw(session.firmware.as_str()));
     }
     fit(parts, width)
 }

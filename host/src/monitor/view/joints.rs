@@ -67,6 +67,9 @@ fn row<'a>(
     let palette = screen.palette;
     let is_chosen = screen.joint == Some(index);
     let number = |value: Option<f32>, digits: usize| {
+        // What is printed as zero has no sign.
+        let value =
+            value.map(|value| if value.abs() < 0.5 * 0.1_f32.powi(digits as i32) { 0.0 } else { value });
         value.map_or_else(|| format!("{:>NUMBER$} ", "-"), |value| format!("{value:>NUMBER$.digits$} "))
     };
     let end = |value: Option<f32>| value.map_or("     ".into(), |value| format!("{value:>5.2}"));

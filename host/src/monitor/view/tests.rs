@@ -62,7 +62,8 @@ fn grasping() -> Model {
 fn faulty() -> Model {
     let mut model = grasping();
     let fault = Some(Raised::at(3, Fault::Overspeed));
-    let record = Record { mode: Mode::Fault, fault, late_ticks: 4, dropped: 2, ..record(2991) };
+    let record =
+        Record { mode: Mode::Fault, fault, late_ticks: 4, dropped: 2, decimation: 4, ..record(2991) };
     model.take(ms(2991), News::Record(Box::new(record)));
     let refused = "arm: refused, the hand is in a fault: clear it first";
     model.take(ms(2992), News::Notice(Level::Warning, refused.into()));
@@ -81,6 +82,7 @@ fn everything_that_matters_is_there_in_80_columns_and_24_rows() {
         "1000 records/s",
         "65.",
         "65 % of the line",
+        "each tick",
         "lost 0",
         "CRC 0",
         "late 0",
@@ -110,6 +112,7 @@ fn a_fault_its_remedy_and_a_refusal_are_told_in_words() {
         " FAULT ",
         "fault 5: joint 3: speed is above its limit: check what drives the joint",
         "! arm: refused, the hand is in a fault: clear it first",
+        "only 1 tick in 4",
         "late 4!",
         "dropped 2!",
     ] {
