@@ -295,3 +295,136 @@ fn session(about: &About, hand: Option<&str>, number: Option<u16>) -> Session {
         },
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::model::Link;
+    use super::super::model::tests::{ms, record};
+    use super::*;
+    use crate::MAX_JOINTS;
+    use crate::record::mcap::Writer;
+    use blindgrasp_shared::identity::{Clock, Identity, Image, ResetCause, UNITS};
+    use blindgrasp_shared::link::message::Reply;
+    use blindgrasp_shared::telemetry::INTERFACE_VERSION;
+    use std::path::PathBuf;
+    use tempfile::TempDir;
+
+    const BEGUN: u64 = 1_000_000_000_000;
+
+    /// 30 s of a hand at 100 records a second, and another hand; with a gap from 10 to 12 s.
+    fn recording(folder: &TempDir) -> PathBuf {
+        let path = folder.path().join("run.mcap");
+        let hand = HandModel::load("three-finger").expect("the hand");
+        let image = Image {
+            interface_version: INTERFACE_VERSION,
+            kind: "hand",
+            hand: "three-finger",
+            hand_hash: hand.hash(),
+            firmware_version: "0.1.0",
+            build_hash: 1,
+            joint_count: 12,
+            fingertip_count: 3,
+            period_us: 1000,
+        };
+        let (clock, reset) = (Clock::External, ResetCause::PowerOn);
+        let about = About::of(&Identity { image, units: UNITS, clock, reset, crash: None });
+        let mut writer = Writer::create(&path, false).expect("a file");
+        let devices = [writer.add_device("hand1"), writer.add_device("hand2")];
+        let at = |ms: u32| Stamp(BEGUN + u64::from(ms) * 1_000_000);
+        for device in devices {
+            writer.about(device, at(0), &about).expect("room");
+        }
+        let mut buffer = [0; Reply::<MAX_JOINTS>::MOST_BYTES];
+        for tick in (0..=30_000).step_by(10).filter(|tick| !(10_000..12_000).contains(tick)) {
+            if tick == 12_000 {
+                writer.gap(devices[0], at(10_000), "the port is gone").expect("room");
+                writer.event(devices[0], at(12_000), mcap::Level::Info, "the port is back").expect("room");
+            }
+            for (k, device) in devices.into_iter().enumerate() {
+                let number = tick / 10 * (k as u32 + 1);
+                let record = crate::device::client::Record { sequence: number, ..record(tick) };
+                let payload = postcard::to_slice(&Reply::Record(record), &mut buffer).expect("room");
+                writer.received(device, at(tick), payload).expect("room");
+            }
+        }
+        writer.finish().expect("an end");
+        path
+    }
+
+    /// Goes on until it is where it should be.
+    fn settle(playback: &mut Playback) {
+        playback.turn(Duration::ZERO).expect("it can be read");
+        for _ in 0..1000 {
+            if !playback.is_seeking() {
+                return;
+            }
+            playback.turn(Duration::ZERO).expect("it can be read");
+        }
+        panic!("it never gets there");
+    }
+
+    fn tick(playback: &Playback) -> u32 {
+        playback.model().record().expect("a record").tick
+    }
+
+    #[test]
+    fn it_is_played_in_its_own_time_forwards_and_back() {
+        let folder = TempDir::new().expect("a folder");
+        let mut playback = Playback::open(&recording(&folder), None, None).expect("a recording");
+        assert_eq!((playback.length(), playback.device()), (ms(30_000), ("hand1", 2)));
+        playback.turn(ms(500)).expect("it can be read");
+        settle(&mut playback);
+        assert_eq!((tick(&playback), playback.position()), (500, ms(500)));
+        playback.hurry(true);
+        playback.turn(ms(500)).expect("it can be read");
+        settle(&mut playback);
+        assert_eq!(tick(&playback), 1500);
+        playback.forward(ms(3000));
+        settle(&mut playback);
+        assert_eq!(tick(&playback), 4500);
+        let speed = playback.model().joints().nth(1).and_then(|joint| joint.speed).expect("a speed");
+        assert!((speed - 10.0 * 1000.0 * std::f32::consts::TAU / 21_600.0).abs() < 1e-3, "{speed}");
+        playback.back(ms(4000)).expect("it can be read");
+        settle(&mut playback);
+        assert_eq!(tick(&playback), 500);
+        playback.pause().expect("it can be read");
+        playback.turn(ms(500)).expect("it can be read");
+        assert_eq!(tick(&playback), 500);
+        playback.pause().expect("it can be read");
+        playback.forward(ms(3_600_000));
+        settle(&mut playback);
+        playback.turn(ms(1)).expect("it can be read");
+        assert!(playback.is_paused() && playback.position() == playback.length());
+        assert_eq!((tick(&playback), playback.model().lost()), (30_000, 0));
+        // From the beginning again.
+        playback.pause().expect("it can be read");
+        playback.turn(ms(10)).expect("it can be read");
+        assert_eq!(tick(&playback), 20);
+    }
+
+    #[test]
+    fn a_gap_is_shown_where_it_was() {
+        let folder = TempDir::new().expect("a folder");
+        let mut playback = Playback::open(&recording(&folder), Some("hand1"), None).expect("a recording");
+        playback.forward(ms(11_000));
+        settle(&mut playback);
+        let cut = Link::Cut { since: ms(10_000), words: "the port is gone".into() };
+        assert_eq!((playback.model().link(), tick(&playback)), (&cut, 9990));
+        playback.forward(ms(1500));
+        settle(&mut playback);
+        assert_eq!((playback.model().link(), tick(&playback)), (&Link::Open, 12_500));
+        assert!(playback.model().notices().any(|notice| notice.words == "the port is back"));
+    }
+
+    #[test]
+    fn another_device_has_its_own_records_and_losses() {
+        let folder = TempDir::new().expect("a folder");
+        let path = recording(&folder);
+        let mut playback = Playback::open(&path, Some("hand2"), None).expect("a recording");
+        playback.forward(ms(1000));
+        settle(&mut playback);
+        assert_eq!((playback.device().0, playback.model().lost()), ("hand2", 100));
+        let unknown = Playback::open(&path, Some("hand3"), None).err().expect("an error").to_string();
+        assert_eq!(unknown, "there is no device `hand3` in this recording: it has hand1, hand2");
+    }
+}

@@ -125,10 +125,6 @@ fn link<'a>(model: &'a Model, screen: &Screen<'a>, now: Duration, width: usize) 
     let share = 100.0 * model.line_share(now);
     let mut parts = vec![
         Span::raw(format!("{:.0} records/s", model.records_s(now))),
-        match record.decimation {
-            0 | 1 => Span::raw("each tick"),
-            every => Span::styled(format!("only 1 tick in {every}"), palette.warning()),
-        },
         Span::raw(format!("{:.1} kB/s", 1e-3 * model.bytes_s(now))),
         Span::raw(format!("{share:.0} % of the line")),
         counted("lost", model.lost()),
@@ -136,6 +132,11 @@ fn link<'a>(model: &'a Model, screen: &Screen<'a>, now: Duration, width: usize) 
         counted("late", u64::from(record.late_ticks)),
         counted("dropped", u64::from(record.dropped)),
     ];
+    match record.decimation {
+        0 | 1 => parts.push(Span::raw("each tick")),
+        // Ahead of what may be cut off.
+        every => parts.insert(1, Span::styled(format!("only 1 tick in {every}!"), palette.warning())),
+    }
     if let Some(share) = model.tick_share() {
         parts.push(Span::raw(format!("tick {:.1} % ({} cycles)", 100.0 * share, record.cycles)));
     }
