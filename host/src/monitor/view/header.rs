@@ -64,8 +64,8 @@ fn state<'a>(model: &'a Model, screen: &Screen<'a>, now: Duration, width: usize)
     if record.events.contains(Event::FallbackClock) {
         parts.push(Span::styled("fall-back clock", palette.warning()));
     }
-    parts.push(Span::raw(format!("{:.2} N", record.force_n)));
-    parts.push(Span::raw(format!("{:.4} N m", record.attitude_stiffness_nm)));
+    parts.push(Span::raw(format!("force {:.2} N", record.force_n)));
+    parts.push(Span::raw(format!("stiffness {:.4} N m", record.attitude_stiffness_nm)));
     parts.push(Span::raw(format!("work {:.3} J", record.energy_j)));
     if let Some(time_s) = model.device_time_s() {
         parts.push(Span::styled(format!("device {time_s:.1} s"), palette.faint()));
