@@ -11,17 +11,18 @@ use crate::control::{Control, Timing};
 use crate::joints::Joints;
 use crate::link::MOST_SENT;
 use crate::model::{FINGERS, JOINTS, params};
-use crate::queue::HandReply;
 use crate::semihosting::File;
 use blindgrasp_shared::command::{Command, Grasp};
 use blindgrasp_shared::control::{GraspConfig, Grip, Latch};
 use blindgrasp_shared::device::Reading;
 use blindgrasp_shared::fault::Raised;
 use blindgrasp_shared::hand::Posture;
-use blindgrasp_shared::link::encode;
+use blindgrasp_shared::link::Sender;
 use blindgrasp_shared::link::message::{Packet, Reply, Request, Signals};
 use blindgrasp_shared::supervisor::Mode;
 use blindgrasp_shared::telemetry::INTERFACE_VERSION;
+use blindgrasp_shared::telemetry::dense::TAG;
+use blindgrasp_shared::telemetry::snapshot::BYTES_PER_JOINT;
 use blindgrasp_shared::tick::Params;
 use core::fmt::Write;
 use core::hint::black_box;
@@ -33,6 +34,9 @@ type HandParams = Params<f32, JOINTS, FINGERS>;
 
 /// Ticks that are measured, after the grasp has its full force.
 const TICKS: usize = 200;
+
+/// Bytes of the largest snapshot.
+const SNAPSHOT_MOST: usize = JOINTS * BYTES_PER_JOINT;
 
 /// Counts instructions.
 struct Counter {
@@ -74,8 +78,12 @@ struct Figures {
     law_gravity_off: u32,
     law_gravity_on: u32,
     tick: u32,
-    encode: u32,
-    record_bytes: usize,
+    encode_full: u32,
+    encode_dense: u32,
+    save: u32,
+    full_bytes: usize,
+    dense_bytes: usize,
+    snapshot_bytes: usize,
 }
 
 /// Joints that move a little about the middle of their ranges.
@@ -166,11 +174,12 @@ fn whole_tick(
     // From hello to full force: the soft start takes as long as it takes.
     let settle = 20 + params.config().supervisor.soft_start_ms as usize;
     let mut joints = Swinging { params, tick: 0 };
+    let mut sender = Sender::new();
     let mut session = 0;
     for tick in 0..settle + TICKS {
         let request = match tick {
             0 => Request::Hello { interface_version: INTERFACE_VERSION },
-            1 => Request::Telemetry { decimation: 1, signals: Signals::ALL },
+            1 => Request::Telemetry { decimation: 1, signals: Signals::FULL },
             5 => Request::Command(Command::Arm),
             10 => Request::Command(Command::Grasp(Grasp::CONFIGURED)),
             _ => Request::Heartbeat,
@@ -198,25 +207,43 @@ fn whole_tick(
             return Err("the hand does not grasp");
         }
         figures.tick = figures.tick.max(instructions.saturating_sub(idle));
-        let record: HandReply = Reply::Record(outputs.record);
+        let Some(signals) = outputs.telemetry else { return Err("there was no record") };
         let mut buffer = [0; MOST_SENT];
         let mut length = 0;
+        // One after the other, as they are sent: one in a hundred is full.
         let instructions = counter.instructions(|| {
-            length = encode(black_box(&record), black_box(&mut buffer)).map_or(0, <[u8]>::len);
+            let frame = sender.record(black_box(&outputs.record), signals, black_box(&mut buffer));
+            length = frame.map_or(0, <[u8]>::len);
         });
-        figures.encode = figures.encode.max(instructions);
-        figures.record_bytes = figures.record_bytes.max(length);
+        // The first byte of the payload, behind the code of its block.
+        let (most, bytes) = if buffer.get(1) == Some(&TAG) {
+            (&mut figures.encode_dense, &mut figures.dense_bytes)
+        } else {
+            (&mut figures.encode_full, &mut figures.full_bytes)
+        };
+        *most = instructions.max(*most);
+        *bytes = length.max(*bytes);
+        let mut buffer = [0; SNAPSHOT_MOST];
+        let mut length = 0;
+        let instructions = counter.instructions(|| {
+            let saved = control.device().state().save(params, black_box(&mut buffer));
+            length = saved.map_or(0, |bytes| bytes.len());
+        });
+        figures.save = figures.save.max(instructions);
+        figures.snapshot_bytes = length;
     }
     Ok(())
 }
 
 fn print(figures: &Figures) -> Result<(), &'static str> {
-    let Figures { law_gravity_off, law_gravity_on, tick, encode, record_bytes } = figures;
-    let mut json = String::<256>::new();
+    let &Figures { law_gravity_off, law_gravity_on, tick, encode_full, encode_dense, save, .. } = figures;
+    let &Figures { full_bytes, dense_bytes, snapshot_bytes, .. } = figures;
+    let mut json = String::<384>::new();
     writeln!(
         json,
         "{{\"law_gravity_off\": {law_gravity_off}, \"law_gravity_on\": {law_gravity_on}, \"tick\": {tick}, \
-         \"encode\": {encode}, \"frame_bytes\": {record_bytes}}}"
+         \"encode_full\": {encode_full}, \"encode_dense\": {encode_dense}, \"save\": {save}, \
+         \"full_bytes\": {full_bytes}, \"dense_bytes\": {dense_bytes}, \"snapshot_bytes\": {snapshot_bytes}}}"
     )
     .map_err(|_| "the figures are too long")?;
     let mut output = File::standard_output().ok_or("there is no standard output")?;

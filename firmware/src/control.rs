@@ -66,6 +66,11 @@ impl Control {
         Self { device, burst, failed: None }
     }
 
+    /// The hand.
+    pub fn device(&self) -> &Device<JOINTS, FINGERS> {
+        &self.device
+    }
+
     /// One turn. Torques that could not be written are a failed reading in the next.
     pub fn turn(
         &mut self,

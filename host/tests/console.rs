@@ -14,6 +14,7 @@ use blindgrasp_shared::link::{Receiver, encode, most_bytes};
 use blindgrasp_shared::settings::Parameter;
 use blindgrasp_shared::supervisor::Mode;
 use blindgrasp_shared::telemetry::INTERFACE_VERSION;
+use blindgrasp_shared::telemetry::burst::Burst;
 use blindgrasp_shared::tick::Params;
 use serde::Serialize;
 use std::collections::VecDeque;
@@ -22,6 +23,7 @@ use std::time::{Duration, Instant};
 /// A board with the image `hand` whose joints stand still in the hand's nominal posture.
 struct Board {
     device: Device<MAX_JOINTS, MAX_FINGERS>,
+    burst: Box<Burst<MAX_JOINTS>>,
     receiver: Receiver<512>,
     waiting: VecDeque<Packet>,
     reading: Reading<MAX_JOINTS>,
@@ -65,6 +67,7 @@ impl Board {
         }
         Self {
             device: Device::new(Params::new(hand.hand.cast(), &hand.config).expect("parameters"), identity),
+            burst: Box::new(Burst::new()),
             receiver: Receiver::new(),
             waiting: VecDeque::new(),
             reading: Reading::Counts(counts),
@@ -88,7 +91,9 @@ impl Board {
     fn tick(&mut self) -> Vec<u8> {
         let packet = self.waiting.pop_front();
         let reading = self.reading;
-        let outputs = self.device.tick(&Inputs { reading, late: false, cycles: 7, dropped: 0, packet });
+        let outputs = self
+            .device
+            .tick(&Inputs { reading, late: false, cycles: 7, dropped: 0, packet }, &mut self.burst);
         (self.mode, self.fault) = (outputs.record.mode, outputs.record.fault);
         let mut said = Vec::new();
         if let Some(reply) = outputs.reply {

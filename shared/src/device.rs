@@ -196,7 +196,7 @@ impl<const J: usize, const F: usize> Device<J, F> {
                 Caught::NotOver => answer(Some(Refusal::BurstNotOver)),
                 Caught::NoSuchRecord => answer(Some(Refusal::OutOfRange)),
                 Caught::Record { count, record } => {
-                    Asked::Answered(Reply::Burst { sequence, index, count, record: record.clone() })
+                    Asked::Answered(Reply::Burst { sequence, index, count, record })
                 }
             },
             Request::Joints(_) => answer(Some(Refusal::JointsAreReal)),

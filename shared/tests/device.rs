@@ -11,6 +11,8 @@ use blindgrasp_shared::link::message::{Packet, Reply, Request, Sample, Signals, 
 use blindgrasp_shared::link::{self, Receiver, most_bytes};
 use blindgrasp_shared::settings::{Each, Parameter};
 use blindgrasp_shared::supervisor::Mode;
+use blindgrasp_shared::telemetry::burst::{AFTER, BEFORE, Burst};
+use blindgrasp_shared::telemetry::snapshot::{Collector, PART_BYTES};
 use blindgrasp_shared::telemetry::{INTERFACE_VERSION, List, Record};
 use common::{JOINTS, config, facing_counts, params};
 use proptest::prelude::*;
@@ -35,6 +37,8 @@ fn identity(clock: Clock) -> Identity<'static> {
 /// A device and a host that numbers its requests.
 struct Bench {
     device: Device<12, 3>,
+    burst: Box<Burst<12>>,
+    dropped: u32,
     session: u16,
     sequence: u16,
 }
@@ -44,7 +48,13 @@ impl Bench {
     fn silent(clock: Clock) -> Self {
         let mut config = config();
         config.faults.heartbeat_ms = Some(100);
-        Self { device: Device::new(params(&config), identity(clock)), session: 0, sequence: 0 }
+        Self {
+            device: Device::new(params(&config), identity(clock)),
+            burst: Box::new(Burst::new()),
+            dropped: 3,
+            session: 0,
+            sequence: 0,
+        }
     }
 
     /// In a session.
@@ -58,7 +68,11 @@ impl Bench {
 
     fn tick(&mut self, packet: Option<Packet12>) -> Outputs<12> {
         let reading = Reading::Counts(facing_counts());
-        self.device.tick(&Inputs { reading, late: false, cycles: 7, dropped: 3, packet })
+        self.tick_with(reading, self.dropped, packet)
+    }
+
+    fn tick_with(&mut self, reading: Reading<12>, dropped: u32, packet: Option<Packet12>) -> Outputs<12> {
+        self.device.tick(&Inputs { reading, late: false, cycles: 7, dropped, packet }, &mut self.burst)
     }
 
     fn packet(&mut self, request: Request<12>) -> Packet12 {
@@ -313,7 +327,7 @@ fn joints_over_the_link_are_for_another_image_and_real_ones_may_fail() {
     assert_eq!(bench.refused(Request::Joints(sample)), Some(Refusal::JointsAreReal));
     let raised = Raised::at(4, Fault::CounterReset);
     let inputs = Inputs { reading: Reading::Failed(raised), late: true, cycles: 0, dropped: 0, packet: None };
-    let record = bench.device.tick(&inputs).record;
+    let record = bench.device.tick(&inputs, &mut bench.burst).record;
     assert_eq!((record.mode, record.fault, record.reading_failed), (Mode::Fault, Some(raised), Some(raised)));
     assert!(record.events.contains(Event::Late));
     bench.done(Request::Command(Command::ClearFault));
@@ -377,6 +391,8 @@ fn requests() -> impl Strategy<Value = Request<12>> {
             value
         }),
         any::<u16>().prop_map(|decimation| Request::Telemetry { decimation, signals: Signals::ALL }),
+        any::<u16>().prop_map(|decimation| Request::Telemetry { decimation, signals: Signals::FULL }),
+        (0..300_u16).prop_map(|index| Request::Burst { index }),
     ]
 }
 
@@ -411,5 +427,151 @@ proptest! {
                 prop_assert_eq!(outputs.torques_nm, [0.0; 12]);
             }
         }
+    }
+}
+
+/// What a request asks for, and its answer.
+fn full(bench: &mut Bench, decimation: u16) {
+    bench.done(Request::Telemetry { decimation, signals: Signals::FULL });
+}
+
+#[test]
+fn the_burst_holds_what_was_around_the_fault_until_the_hand_is_armed() {
+    let mut bench = Bench::grasping();
+    assert_eq!(bench.refused(Request::Burst { index: 0 }), Some(Refusal::NoBurst));
+    for _ in 0..300 {
+        bench.ask(Request::Heartbeat);
+    }
+    let raised = Raised::at(4, Fault::CounterReset);
+    let first = bench.tick_with(Reading::Failed(raised), 3, None).record;
+    assert_eq!(first.mode, Mode::Fault);
+    assert_eq!(bench.refused(Request::Burst { index: 0 }), Some(Refusal::BurstNotOver));
+    for _ in 0..AFTER {
+        bench.tick(None);
+    }
+    let total = (BEFORE + AFTER) as u16;
+    for again in 0..2 {
+        for asked in 0..total {
+            let reply = bench.ask(Request::Burst { index: asked });
+            let Reply::Burst { index, count, record, .. } = reply else { panic!("{reply:?}") };
+            assert_eq!((index, count), (asked, total));
+            // One a tick, and the fault is where it should be.
+            let tick = first.tick - BEFORE as u32 + u32::from(asked);
+            assert_eq!((record.tick, record.sequence), (tick, tick));
+            let mode = if usize::from(asked) < BEFORE { Mode::Grasping } else { Mode::Fault };
+            assert_eq!(record.mode, mode, "{asked}, for the time {again}");
+            assert_eq!(record.reading_failed, (record.tick == first.tick).then_some(raised));
+            assert_eq!(record.torques_nm.as_slice().len(), 12);
+        }
+    }
+    assert_eq!(bench.refused(Request::Burst { index: total }), Some(Refusal::OutOfRange));
+    // Clearing the fault does not lose it; arming does.
+    bench.ask(Request::Heartbeat);
+    bench.done(Request::Command(Command::ClearFault));
+    assert!(matches!(bench.ask(Request::Burst { index: 0 }), Reply::Burst { .. }));
+    bench.done(Request::Command(Command::Arm));
+    assert_eq!(bench.refused(Request::Burst { index: 0 }), Some(Refusal::NoBurst));
+    // A fault soon after: what was before it is less.
+    bench.tick_with(Reading::Failed(raised), 3, None);
+    for _ in 0..AFTER {
+        bench.tick(None);
+    }
+    let reply = bench.ask(Request::Burst { index: 0 });
+    let Reply::Burst { count, .. } = reply else { panic!("{reply:?}") };
+    assert_eq!(usize::from(count), AFTER + 2, "since the tick that armed it");
+}
+
+#[test]
+fn what_is_lost_doubles_the_decimation_until_nothing_is() {
+    let mut bench = Bench::new();
+    full(&mut bench, 3);
+    let mut seen = Vec::new();
+    let mut sent = Vec::new();
+    for tick in 0..2000_u32 {
+        // Until one in 48 is sent, something is lost all the time.
+        bench.dropped += u32::from(tick < 1500 && seen.last() != Some(&48) && tick > 10);
+        let outputs = bench.tick(None);
+        let decimation = outputs.record.decimation;
+        if seen.last() != Some(&decimation) {
+            seen.push(decimation);
+            println!("tick {tick}: one in {decimation}");
+        }
+        if outputs.telemetry.is_some() {
+            sent.push((outputs.record.tick, decimation));
+        }
+    }
+    assert_eq!(seen[..5], [3, 6, 12, 24, 48]);
+    // What was lost just before the last doubling may cost one more.
+    assert!(seen.len() <= 6, "{seen:?}");
+    assert!(
+        sent.windows(2).all(|pair| pair[1].0 - pair[0].0 == u32::from(pair[0].1)),
+        "as the record before said"
+    );
+    full(&mut bench, 3);
+    assert_eq!(bench.tick(None).record.decimation, 3);
+    // One in a thousand is the least that it chooses by itself.
+    full(&mut bench, 700);
+    let mut last = 0;
+    for _ in 0..1000 {
+        bench.dropped += 1;
+        last = bench.tick(None).record.decimation;
+    }
+    assert_eq!(last, 1000);
+    full(&mut bench, 5000);
+    for _ in 0..200 {
+        bench.dropped += 1;
+        last = bench.tick(None).record.decimation;
+    }
+    assert_eq!(last, 5000, "it was asked for");
+    bench.done(Request::Telemetry { decimation: 0, signals: Signals::NONE });
+    assert_eq!(bench.tick(None).record.decimation, 1, "where nothing is sent");
+}
+
+#[test]
+fn snapshots_come_in_parts_and_are_the_state_after_their_tick() {
+    let mut bench = Bench::grasping();
+    let begun = bench.packet(Request::Telemetry { decimation: 1, signals: Signals::FULL });
+    let mut packet = Some(begun);
+    let mut collector = Collector::new();
+    let (mut saved, mut whole, mut last_part) = (Vec::new(), Vec::new(), 0);
+    let mut buffer = [0; 2048];
+    for tick in 0..2500_u32 {
+        let outputs = bench.tick(packet.take());
+        let state = bench.device.state().save(bench.device.params(), &mut buffer).unwrap();
+        saved.push((outputs.record.tick, state.to_vec()));
+        if let Some(part) = outputs.part {
+            assert!(whole.is_empty() || tick - last_part >= 4, "one in four ticks");
+            last_part = tick;
+            assert!(part.bytes.len() <= PART_BYTES);
+            if let Some((tick, bytes)) = collector.add(&part) {
+                whole.push((tick, bytes.to_vec()));
+            }
+        }
+    }
+    let first = saved[0].0;
+    assert_eq!(whole.iter().map(|(tick, _)| tick - first).collect::<Vec<_>>(), [0, 1000, 2000]);
+    println!("{} bytes in {} parts", whole[0].1.len(), whole[0].1.len().div_ceil(PART_BYTES));
+    for snapshot in whole {
+        assert!(saved.contains(&snapshot));
+    }
+}
+
+#[test]
+fn a_snapshot_with_a_part_missing_is_never_whole() {
+    for missing in 0..5 {
+        let mut bench = Bench::grasping();
+        full(&mut bench, 1);
+        let mut collector = Collector::new();
+        let mut parts = 0;
+        for _ in 0..900 {
+            if let Some(part) = bench.tick(None).part {
+                parts += 1;
+                assert!(parts - 1 == missing || collector.add(&part).is_none(), "without part {missing}");
+            }
+        }
+        assert!(parts > 5, "{parts}");
+        let whole =
+            (0..1000).filter_map(|_| bench.tick(None).part).any(|part| collector.add(&part).is_some());
+        assert!(whole, "the next is whole again");
     }
 }

@@ -21,11 +21,13 @@ use std::path::{Path, PathBuf};
 /// The hand whose firmware is measured if no scene says otherwise.
 const BENCH_SCENE: &str = "cube";
 /// What the firmware measures: key, and what it is.
-const FIGURES: [(&str, &str); 4] = [
+const FIGURES: [(&str, &str); 6] = [
     ("law_gravity_off", "grasp law without gravity compensation"),
     ("law_gravity_on", "grasp law with gravity compensation"),
     ("tick", "whole tick"),
-    ("encode", "encoding of its record"),
+    ("encode_full", "encoding of its record in full"),
+    ("encode_dense", "encoding of its record in the dense form"),
+    ("save", "saving its state, one tick in a thousand"),
 ];
 
 /// Run a scene with the firmware in the loop, and compare it bit for bit with the host

@@ -12,6 +12,7 @@ use blindgrasp_shared::link::message::{Reply, not_understood};
 use blindgrasp_shared::link::{Receiver, encode, most_bytes};
 use blindgrasp_shared::settings::Parameter;
 use blindgrasp_shared::telemetry::INTERFACE_VERSION;
+use blindgrasp_shared::telemetry::burst::Burst;
 use blindgrasp_shared::tick::Params;
 use serde::Serialize;
 use std::collections::VecDeque;
@@ -60,6 +61,7 @@ pub(crate) enum Wrong {
 
 pub(crate) struct Firmware {
     device: Device<MAX_JOINTS, MAX_FINGERS>,
+    burst: Box<Burst<MAX_JOINTS>>,
     joint_count: usize,
     wrong: Wrong,
     started: Instant,
@@ -95,6 +97,7 @@ impl Firmware {
         let params = Params::new(hand.hand.cast(), &hand.config).expect("parameters");
         Self {
             device: Device::new(params, identity),
+            burst: Box::new(Burst::new()),
             joint_count: hand.hand.joint_count(),
             wrong,
             started: Instant::now(),
@@ -130,7 +133,7 @@ impl Firmware {
         );
         let asked = packet.clone();
         let inputs = Inputs { reading, late: sample.late, cycles: 1234, dropped: 0, packet };
-        let outputs = self.device.tick(&inputs);
+        let outputs = self.device.tick(&inputs, &mut self.burst);
         let mut record = outputs.record;
         if self.wrong == Wrong::Used {
             record.tick += self.ticks;

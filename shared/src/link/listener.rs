@@ -1,15 +1,17 @@
 //! Payloads to replies and records, on the host's side.
 
 use super::message::Reply;
-use crate::telemetry::dense::{self, Undecoded};
-use crate::telemetry::{DecodeError, List, Record};
+use crate::telemetry::dense::{self, Counts, Undecoded};
+use crate::telemetry::{DecodeError, Record};
 use core::fmt;
 
 /// Hears what a device says, and remembers of its records what dense ones go on from.
 #[derive(Clone, Debug)]
 pub struct Listener<const J: usize> {
-    /// The last record, and the last counts, which it may not have.
-    last: Option<(Record<f32, J>, List<i32, J>)>,
+    /// The last record.
+    last: Option<Record<f32, J>>,
+    /// The last counts, which it may not have.
+    counts: Counts<J>,
     /// Something is missing since: only a full record helps.
     lost: bool,
 }
@@ -51,7 +53,7 @@ impl core::error::Error for HearError {}
 impl<const J: usize> Listener<J> {
     /// Nothing was heard.
     pub const fn new() -> Self {
-        Self { last: None, lost: false }
+        Self { last: None, counts: Counts::new(), lost: false }
     }
 
     /// Takes the payload of a good frame.
@@ -64,22 +66,21 @@ impl<const J: usize> Listener<J> {
         }
         let reply = Reply::decode(payload).map_err(HearError::Decode)?;
         if let Reply::Record(record) = &reply {
-            self.last = Some((record.clone(), record.counts));
+            self.counts.take(record);
+            self.last = Some(record.clone());
             self.lost = false;
         }
         Ok(Heard { reply, digest: None })
     }
 
     fn dense<'p>(&mut self, payload: &[u8]) -> Result<Heard<'p, J>, HearError> {
-        let (last, counts) = self.last.as_mut().ok_or(HearError::NoFullRecord)?;
+        let last = self.last.as_mut().ok_or(HearError::NoFullRecord)?;
         if self.lost {
             return Err(HearError::Lost);
         }
-        match dense::read(payload, last, counts) {
+        match dense::read(payload, last, &self.counts) {
             Ok((record, digest)) => {
-                if !record.counts.is_empty() {
-                    *counts = record.counts;
-                }
+                self.counts.take(&record);
                 *last = record.clone();
                 Ok(Heard { reply: Reply::Record(record), digest: Some(digest) })
             }

@@ -119,7 +119,9 @@ struct Past {
 /// What a sender remembers of the records before.
 #[derive(Clone, Debug)]
 pub struct Encoder<const J: usize> {
+    /// The last counts, and in which record they were.
     counts: List<i32, J>,
+    counts_sequence: u32,
     past: [Past; WINDOW],
     /// Where the oldest is.
     oldest: usize,
@@ -128,6 +130,8 @@ pub struct Encoder<const J: usize> {
     signals: Signals,
     /// Tick of the last full record.
     full_tick: Option<u32>,
+    /// So many records are sent in full in any case.
+    full_left: usize,
 }
 
 impl<const J: usize> Encoder<J> {
@@ -136,12 +140,14 @@ impl<const J: usize> Encoder<J> {
         let nothing = Past { change: 0, late_ticks: 0, dropped: 0 };
         Self {
             counts: List::empty(0),
+            counts_sequence: 0,
             past: [nothing; WINDOW],
             oldest: 0,
             sequence: 0,
             decimation: 0,
             signals: Signals::NONE,
             full_tick: None,
+            full_left: 0,
         }
     }
 
@@ -154,14 +160,22 @@ impl<const J: usize> Encoder<J> {
             record.late_ticks.wrapping_sub(past.late_ticks) <= most
                 && record.dropped.wrapping_sub(past.dropped) <= most
         });
+        // A receiver knows which lists there are from a full record: with other signals, none but full ones are sent until
+        // it has one, or has lost too many.
+        let parts = signals.without(Signals::DENSE);
+        if self.full_tick.is_some() && parts != self.signals {
+            self.full_left = WINDOW;
+        }
+        self.signals = parts;
+        let is_near = |sequence: u32| record.sequence.wrapping_sub(sequence) as usize <= WINDOW;
         let (counts, before) = (record.counts.as_slice(), self.counts.as_slice());
         let dense = signals.contain(Signals::DENSE)
-            && signals == self.signals
+            && self.full_left == 0
             && record.answer.is_none()
             && record.decimation == self.decimation
-            && record.sequence.wrapping_sub(self.sequence) as usize <= WINDOW
+            && is_near(self.sequence)
             && self.full_tick.is_some_and(|full| record.tick.wrapping_sub(full) < FULL_EVERY_TICKS)
-            && (counts.is_empty() || counts.len() == before.len())
+            && (counts.is_empty() || counts.len() == before.len() && is_near(self.counts_sequence))
             && grows_slowly;
 
         let changes = counts.iter().zip(before).map(|(new, old)| new.wrapping_sub(*old).unsigned_abs());
@@ -172,12 +186,13 @@ impl<const J: usize> Encoder<J> {
         self.oldest = (self.oldest + 1) % WINDOW;
         self.sequence = record.sequence;
         self.decimation = record.decimation;
-        self.signals = signals;
-        if !counts.is_empty() || !dense {
+        if !counts.is_empty() {
             self.counts = record.counts;
+            self.counts_sequence = record.sequence;
         }
         if !dense {
             self.full_tick = Some(record.tick);
+            self.full_left = self.full_left.saturating_sub(1);
             return None;
         }
         if counts.is_empty() {
@@ -274,12 +289,34 @@ pub(crate) enum Undecoded {
     Lost,
 }
 
+/// The last counts that a receiver knows.
+#[derive(Clone, Debug)]
+pub(crate) struct Counts<const J: usize> {
+    counts: List<i32, J>,
+    /// In which record they were.
+    sequence: u32,
+}
+
+impl<const J: usize> Counts<J> {
+    /// None are known.
+    pub(crate) const fn new() -> Self {
+        Self { counts: List::empty(0), sequence: 0 }
+    }
+
+    /// Takes those of a record, if it has some.
+    pub(crate) fn take(&mut self, record: &Record<f32, J>) {
+        if !record.counts.is_empty() {
+            *self = Self { counts: record.counts, sequence: record.sequence };
+        }
+    }
+}
+
 /// Reads the dense form of the record that follows another, which need not be the one just before it. Returns the
 /// record and its digest.
 pub(crate) fn read<const J: usize>(
     bytes: &[u8],
     before: &Record<f32, J>,
-    counts_before: &List<i32, J>,
+    counts_before: &Counts<J>,
 ) -> Result<(Record<f32, J>, u16), Undecoded> {
     let mut body = Body(bytes);
     if body.byte()? != TAG {
@@ -287,6 +324,12 @@ pub(crate) fn read<const J: usize>(
     }
     let sequence = body.byte()?;
     let tick = body.u16()?;
+    let passed = u32::from(sequence.wrapping_sub(before.sequence as u8));
+    let ticks = u32::from(tick.wrapping_sub(before.tick as u16));
+    if passed as usize > WINDOW || ticks != (passed * u32::from(before.decimation)) & 0xffff {
+        return Err(Undecoded::Lost);
+    }
+    let sequence = before.sequence.wrapping_add(passed);
     let [mode_events, flags] = body.array()?;
     let cycles = 4 * u32::from(body.u16()?);
     let grown = body.byte()?;
@@ -302,11 +345,12 @@ pub(crate) fn read<const J: usize>(
     if nibbles > MOST_NIBBLES {
         return Err(malformed);
     }
-    let joint_count = [counts_before.len(), before.torques_nm.len(), before.limiting.len()];
-    let joint_count = joint_count.into_iter().max().unwrap_or(0);
     let mut counts = List::default();
     if nibbles > 0 {
-        counts = *counts_before;
+        if sequence.wrapping_sub(counts_before.sequence) as usize > WINDOW {
+            return Err(Undecoded::Lost);
+        }
+        counts = counts_before.counts;
         let bits = NIBBLE * u32::from(nibbles);
         let mut packed = Unpacked { body: &mut body, waiting: None };
         for count in counts.iter_mut() {
@@ -321,14 +365,13 @@ pub(crate) fn read<const J: usize>(
     }
     let mut torques_nm = List::default();
     if flags & HAS_TORQUES != 0 {
-        torques_nm = List::first_of([0.0; J], joint_count);
+        torques_nm = List::first_of([0.0; J], before.torques_nm.len());
         for torque in torques_nm.iter_mut() {
             *torque = body.half()?;
         }
     }
     let mut limiting = List::first_of([Limiting::NONE; J], before.limiting.len());
     if flags & HAS_LIMITING != 0 {
-        limiting = List::first_of([Limiting::NONE; J], joint_count);
         let mut packed = Unpacked { body: &mut body, waiting: None };
         for limiting in limiting.iter_mut() {
             *limiting = Limiting::from_bits(packed.next()?);
@@ -340,13 +383,11 @@ pub(crate) fn read<const J: usize>(
         return Err(Undecoded::Bytes(DecodeError::TrailingBytes));
     }
 
-    let passed = u32::from(sequence.wrapping_sub(before.sequence as u8));
-    let ticks = u32::from(tick.wrapping_sub(before.tick as u16));
     let grown_by =
         |low: u8, before: u32| before.wrapping_add(u32::from(low.wrapping_sub(before as u8) & 0xf));
     let record = Record {
-        sequence: before.sequence.wrapping_add(passed),
-        tick: before.tick.wrapping_add(ticks),
+        sequence,
+        tick: before.tick.wrapping_add(passed * u32::from(before.decimation)),
         mode,
         fault,
         answer: None,
@@ -365,8 +406,7 @@ pub(crate) fn read<const J: usize>(
         torques_nm,
         limiting,
     };
-    let known = passed as usize <= WINDOW && ticks == passed * u32::from(before.decimation);
-    if known && check(&record) == told_check { Ok((record, told_digest)) } else { Err(Undecoded::Lost) }
+    if check(&record) == told_check { Ok((record, told_digest)) } else { Err(Undecoded::Lost) }
 }
 
 /// Bytes that are still to be read.
