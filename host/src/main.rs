@@ -19,6 +19,9 @@ enum Command {
     Pil(commands::pil::Arguments),
     Flash(commands::flash::Arguments),
     Console(commands::console::Arguments),
+    Record(commands::record::Arguments),
+    #[cfg(unix)]
+    Serve(commands::serve::Arguments),
 }
 
 fn main() -> ExitCode {
@@ -27,6 +30,9 @@ fn main() -> ExitCode {
         Command::Pil(arguments) => commands::pil::run(&arguments),
         Command::Flash(arguments) => commands::flash::run(&arguments),
         Command::Console(arguments) => commands::console::run(&arguments),
+        Command::Record(arguments) => commands::record::run(&arguments),
+        #[cfg(unix)]
+        Command::Serve(arguments) => commands::serve::run(&arguments),
     };
     match outcome {
         Ok(commands::Outcome::Shown) => ExitCode::SUCCESS,

@@ -3,6 +3,10 @@
 pub(crate) mod console;
 pub(crate) mod flash;
 pub(crate) mod pil;
+mod ports;
+pub(crate) mod record;
+#[cfg(unix)]
+pub(crate) mod serve;
 pub(crate) mod sim;
 
 /// How a command ended that was not misused.

@@ -1,5 +1,7 @@
-//! What a run leaves behind: samples in memory, and files in a directory.
+//! What a run leaves behind: samples in memory, files in a directory, and recordings of hands.
 
 pub mod csv;
+#[cfg(feature = "command")]
+pub mod mcap;
 pub mod run_dir;
 pub mod sample;

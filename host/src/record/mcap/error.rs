@@ -1,0 +1,80 @@
+//! Why a recording can't be written or read.
+
+use super::writer::Saved;
+use blindgrasp_shared::telemetry::INTERFACE_VERSION;
+use std::io;
+use std::path::PathBuf;
+
+/// Why a recording can't be written or read.
+#[derive(Debug, thiserror::Error)]
+pub enum RecordingError {
+    /// There is a file already.
+    #[error("{}: is there already; choose another file, or overwrite it with --force", .path.display())]
+    Exists {
+        /// The file.
+        path: PathBuf,
+    },
+    /// The file system says no.
+    #[error("cannot {action} {}", .path.display())]
+    Io {
+        /// What was to be done.
+        action: &'static str,
+        /// The file.
+        path: PathBuf,
+        /// What it said.
+        source: io::Error,
+    },
+    /// Nothing can be added any more.
+    #[error("the recording has stopped: {problem}; {} is whole and holds what came before: {saved}", .path.display())]
+    Stopped {
+        /// The file.
+        path: PathBuf,
+        /// What the file system says; a full disk among others.
+        problem: String,
+        /// What is in the file.
+        saved: Saved,
+    },
+    /// Something that MCAP can't hold.
+    #[error("the recording can't hold this")]
+    Format(#[from] ::mcap::McapError),
+    /// It does not begin as an MCAP file does.
+    #[error("{}: not an MCAP file; recordings are made by `blindgrasp record`, or by `sim --out`", .path.display())]
+    NotMcap {
+        /// The file.
+        path: PathBuf,
+    },
+    /// An MCAP file of something else.
+    #[error("{}: an MCAP file{}, but not a recording of a hand; those are made by `blindgrasp record`, or by `sim --out`", .path.display(), of(.library))]
+    NotARecording {
+        /// The file.
+        path: PathBuf,
+        /// What wrote it.
+        library: String,
+    },
+    /// A recording that a later program made.
+    #[error("{}: a recording of format {theirs}, written by {library}; this program knows formats up to {ours}: use that program", .path.display())]
+    Newer {
+        /// The file.
+        path: PathBuf,
+        /// Its format.
+        theirs: u32,
+        /// What wrote it.
+        library: String,
+        /// The newest that is known.
+        ours: u32,
+    },
+    /// Records of another interface version.
+    #[error("device `{device}` was recorded with interface version {theirs}, and this program has {INTERFACE_VERSION}: its raw records can't be decoded; the decoded signals in the file can still be read with MCAP tools, or use the program that recorded it ({program})")]
+    OtherInterface {
+        /// The device.
+        device: String,
+        /// Its version.
+        theirs: u16,
+        /// What recorded it.
+        program: String,
+    },
+}
+
+fn of(library: &str) -> String {
+    if library.is_empty() { String::new() } else { format!(" (by {library})") }
+}

@@ -1,0 +1,201 @@
+//! The decoded channels as protobuf. Ticks are written field by field, because their message is made for the hand and
+//! comes a thousand times a second; what is rare goes through `prost`.
+
+use super::decoder::Decoded;
+use super::schema::{joint, tick};
+use blindgrasp_shared::event::Event;
+use blindgrasp_shared::fault::Raised;
+use blindgrasp_shared::limit::Limit;
+
+/// How much an event matters.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, prost::Enumeration)]
+#[repr(i32)]
+pub enum Level {
+    /// Not told.
+    Unknown = 0,
+    /// For finding errors.
+    Debug = 1,
+    /// Good to know.
+    Info = 2,
+    /// Something may be wrong.
+    Warning = 3,
+    /// Something is wrong.
+    Error = 4,
+    /// Nothing goes on.
+    Fatal = 5,
+}
+
+/// `foxglove.Log`.
+#[derive(Clone, PartialEq, prost::Message)]
+pub(super) struct Log {
+    #[prost(message, optional, tag = "1")]
+    pub(super) timestamp: Option<prost_types::Timestamp>,
+    #[prost(enumeration = "Level", tag = "2")]
+    pub(super) level: i32,
+    #[prost(string, tag = "3")]
+    pub(super) message: String,
+    #[prost(string, tag = "4")]
+    pub(super) name: String,
+}
+
+/// The link in the last second.
+#[derive(Clone, Copy, PartialEq, prost::Message)]
+pub struct LinkStatus {
+    /// Time that this tells of, s.
+    #[prost(double, tag = "1")]
+    pub seconds_s: f64,
+    /// Bytes of the good frames that came.
+    #[prost(uint64, tag = "2")]
+    pub bytes: u64,
+    /// Good frames that came.
+    #[prost(uint64, tag = "3")]
+    pub frames: u64,
+    /// Frames that came damaged, each of which may have been a record.
+    #[prost(uint64, tag = "4")]
+    pub damaged: u64,
+    /// Records that came and could be decoded.
+    #[prost(uint64, tag = "5")]
+    pub records: u64,
+    /// Records that are missing, by the numbers of those that came.
+    #[prost(uint64, tag = "6")]
+    pub missing: u64,
+    /// Records and answers that the device lost because a queue was full.
+    #[prost(uint64, tag = "7")]
+    pub dropped: u64,
+    /// Frames that came whole and can't be decoded. Of records, those until a full one comes; they are among the missing.
+    #[prost(uint64, tag = "8")]
+    pub unusable: u64,
+    /// Decoded records a second.
+    #[prost(double, tag = "9")]
+    pub rate_hz: f64,
+    /// Ticks from one sent record to the next, as the device told last.
+    #[prost(uint32, tag = "10")]
+    pub decimation: u32,
+    /// Share of the line's time that the frames took; NaN where its speed is not known.
+    #[prost(double, tag = "11")]
+    pub share: f64,
+}
+
+impl LinkStatus {
+    /// Records that were lost on the way or by the host: those that are missing less what the device itself lost. Answers
+    /// that it lost count as records here, so that this is the least there can be.
+    pub fn lost_on_the_way(&self) -> u64 {
+        self.missing.saturating_sub(self.dropped)
+    }
+}
+
+/// Wire types of protobuf.
+const VARINT: u32 = 0;
+const EIGHT_BYTES: u32 = 1;
+const LENGTH: u32 = 2;
+const FOUR_BYTES: u32 = 5;
+
+/// Writes a tick into a buffer. `joint_names` are those that a fault names.
+pub(super) fn write_tick(decoded: &Decoded, joint_names: &[String], buffer: &mut Vec<u8>) {
+    let record = &decoded.record;
+    whole(buffer, tick::SEQUENCE, record.sequence.into());
+    whole(buffer, tick::TICK, record.tick.into());
+    double(buffer, tick::TIME_S, decoded.time_s);
+    whole(buffer, tick::MODE, record.mode as u64);
+    raised(buffer, [tick::FAULT, tick::FAULT_JOINT], record.fault, joint_names);
+    raised(buffer, [tick::READING_FAILED, tick::READING_JOINT], record.reading_failed, joint_names);
+    let events = [Event::Heartbeat, Event::Late, Event::FallbackClock];
+    for (event, number) in events.into_iter().zip([tick::HEARTBEAT, tick::LATE, tick::FALLBACK_CLOCK]) {
+        whole(buffer, number, record.events.contains(event).into());
+    }
+    float(buffer, tick::FORCE_N, record.force_n);
+    float(buffer, tick::STIFFNESS_NM, record.attitude_stiffness_nm);
+    float(buffer, tick::APPROACH_J, record.approach_potential_j);
+    float(buffer, tick::ATTITUDE_J, record.attitude_potential_j);
+    float(buffer, tick::ENERGY_J, record.energy_j);
+    whole(buffer, tick::CYCLES, record.cycles.into());
+    whole(buffer, tick::LATE_TICKS, record.late_ticks.into());
+    whole(buffer, tick::DROPPED, record.dropped.into());
+    whole(buffer, tick::DECIMATION, decoded.decimation().into());
+    whole(buffer, tick::LOST_BEFORE, decoded.lost_before);
+    nested(buffer, tick::JOINTS, |buffer| {
+        for (k, _) in joint_names.iter().enumerate() {
+            nested(buffer, k as u32 + 1, |buffer| write_joint(decoded, k, buffer));
+        }
+    });
+}
+
+fn write_joint(decoded: &Decoded, k: usize, buffer: &mut Vec<u8>) {
+    let record = &decoded.record;
+    if let Some(&count) = record.counts.as_slice().get(k) {
+        key(buffer, joint::COUNT, VARINT);
+        // Small numbers of either sign in few bytes.
+        varint(buffer, u64::from((count.wrapping_shl(1) ^ (count >> 31)) as u32));
+    }
+    let known = |values: &[f32]| values.get(k).copied().unwrap_or(f32::NAN);
+    float(buffer, joint::ANGLE_RAD, known(decoded.angles_rad.as_slice()));
+    float(buffer, joint::SPEED_RAD_S, known(decoded.speeds_rad_s.as_slice()));
+    float(buffer, joint::TORQUE_NM, known(record.torques_nm.as_slice()));
+    if let Some(limiting) = record.limiting.as_slice().get(k).filter(|limiting| !limiting.is_empty()) {
+        let numbers = [joint::BY_TORQUE, joint::BY_SLEW, joint::BY_LOWER_STOP, joint::BY_UPPER_STOP];
+        for (limit, number) in Limit::ALL.into_iter().zip(numbers) {
+            whole(buffer, number, limiting.contains(limit).into());
+        }
+    }
+}
+
+fn raised(buffer: &mut Vec<u8>, [fault, joint]: [u32; 2], raised: Option<Raised>, joint_names: &[String]) {
+    let Some(raised) = raised else { return };
+    whole(buffer, fault, raised.fault.number().into());
+    if let Some(name) = raised.joint.and_then(|k| joint_names.get(usize::from(k))) {
+        key(buffer, joint, LENGTH);
+        varint(buffer, name.len() as u64);
+        buffer.extend_from_slice(name.as_bytes());
+    }
+}
+
+/// A message in a message. Its length stands before it: a byte if it is short, as a joint's always is; otherwise the
+/// message moves up.
+fn nested(buffer: &mut Vec<u8>, number: u32, fill: impl FnOnce(&mut Vec<u8>)) {
+    key(buffer, number, LENGTH);
+    let at = buffer.len();
+    buffer.push(0);
+    fill(buffer);
+    let length = buffer.len() - at - 1;
+    if length < 0x80 {
+        buffer[at] = length as u8;
+    } else {
+        let mut bytes = Vec::with_capacity(4);
+        varint(&mut bytes, length as u64);
+        buffer.splice(at..=at, bytes);
+    }
+}
+
+/// A whole number or a truth value; zero is not written, as is the rule.
+fn whole(buffer: &mut Vec<u8>, number: u32, value: u64) {
+    if value != 0 {
+        key(buffer, number, VARINT);
+        varint(buffer, value);
+    }
+}
+
+fn float(buffer: &mut Vec<u8>, number: u32, value: f32) {
+    if value.to_bits() != 0 {
+        key(buffer, number, FOUR_BYTES);
+        buffer.extend_from_slice(&value.to_le_bytes());
+    }
+}
+
+fn double(buffer: &mut Vec<u8>, number: u32, value: f64) {
+    if value.to_bits() != 0 {
+        key(buffer, number, EIGHT_BYTES);
+        buffer.extend_from_slice(&value.to_le_bytes());
+    }
+}
+
+fn key(buffer: &mut Vec<u8>, number: u32, wire_type: u32) {
+    varint(buffer, u64::from(number << 3 | wire_type));
+}
+
+fn varint(buffer: &mut Vec<u8>, mut value: u64) {
+    while value >= 0x80 {
+        buffer.push(value as u8 | 0x80);
+        value >>= 7;
+    }
+    buffer.push(value as u8);
+}
