@@ -66,7 +66,8 @@ fn a_file_cut_anywhere_gives_every_checkpoint_before() {
             let mut entries = recording.entries().unwrap();
             let given: Vec<Entry> = entries.by_ref().map(Result::unwrap).collect();
             assert_eq!(given, all[..given.len()]);
-            let least = saved.iter().rev().find(|(bytes, _)| *bytes <= length as u64).map_or(0, |saved| saved.1);
+            let least =
+                saved.iter().rev().find(|(bytes, _)| *bytes <= length as u64).map_or(0, |saved| saved.1);
             assert!(given.len() >= least, "{length}: {} of {least}", given.len());
             // Whole checkpoints or nothing.
             assert!(saved.iter().any(|saved| saved.1 == given.len()) || given.len() == all.len());

@@ -23,7 +23,16 @@ fn python() -> Result<(PathBuf, PathBuf), String> {
     let has_packages = || run(&["-c", "import mcap, mcap_protobuf"]);
     if has_packages().is_err() {
         let target = packages.to_string_lossy().into_owned();
-        run(&["-m", "pip", "install", "--quiet", "--target", &target, "mcap==1.3.0", "mcap-protobuf-support==0.5.3"])?;
+        run(&[
+            "-m",
+            "pip",
+            "install",
+            "--quiet",
+            "--target",
+            &target,
+            "mcap==1.3.0",
+            "mcap-protobuf-support==0.5.3",
+        ])?;
     }
     has_packages().map(|()| (python, packages))
 }
@@ -81,7 +90,8 @@ fn compare(told: &Value, ours: &Decoded, joint_names: &[String]) {
             let ours = list.as_slice().get(k).copied().unwrap_or(f32::NAN);
             assert!(same(&told[name], ours), "{name}: {told}, {ours}");
         }
-        let names = ["limited_by_torque", "limited_by_slew", "limited_by_lower_stop", "limited_by_upper_stop"];
+        let names =
+            ["limited_by_torque", "limited_by_slew", "limited_by_lower_stop", "limited_by_upper_stop"];
         for (limit, name) in Limit::ALL.into_iter().zip(names) {
             let limited = record.limiting.as_slice().get(k).is_some_and(|limiting| limiting.contains(limit));
             assert_eq!(told[name], limited);
@@ -94,7 +104,9 @@ fn python_reads_the_same_values() {
     let (python, packages) = match python() {
         Ok(found) => found,
         Err(problem) => {
-            eprintln!("SKIPPED, not passed: the Python packages mcap and mcap-protobuf-support can't be had: {problem}");
+            eprintln!(
+                "SKIPPED, not passed: the Python packages mcap and mcap-protobuf-support can't be had: {problem}"
+            );
             return;
         }
     };
@@ -137,8 +149,12 @@ fn python_reads_the_same_values() {
         let mut compared = 0;
         for (k, device) in recording.devices().iter().enumerate() {
             let topic = format!("/{device}/tick");
-            let theirs: Vec<&Value> =
-                told["ticks"].as_array().unwrap().iter().filter(|tick| tick["topic"] == topic.as_str()).collect();
+            let theirs: Vec<&Value> = told["ticks"]
+                .as_array()
+                .unwrap()
+                .iter()
+                .filter(|tick| tick["topic"] == topic.as_str())
+                .collect();
             let ours: Vec<&Decoded> = decoded.iter().filter(|decoded| decoded.device == k).collect();
             assert_eq!(theirs.len(), ours.len());
             // Python gives messages by their time, which is that of the tick.
@@ -146,11 +162,14 @@ fn python_reads_the_same_values() {
                 compare(theirs, ours, &about(names[k]).joint_names);
                 compared += 1;
             }
-            let received = entries.iter().filter(|e| e.device == k && matches!(e.what, What::Received(_))).count();
+            let received =
+                entries.iter().filter(|e| e.device == k && matches!(e.what, What::Received(_))).count();
             assert_eq!(told["counts"][format!("/{device}/received")].as_u64(), Some(received as u64));
             assert_eq!(told["about"][k]["hand"], names[k]);
             assert_eq!(told["about"][k]["hand_file"], about(names[k]).hand_file.unwrap());
-            for (theirs, ours) in told["parameters"][k]["values"].as_array().unwrap().iter().zip(settings(names[k])) {
+            for (theirs, ours) in
+                told["parameters"][k]["values"].as_array().unwrap().iter().zip(settings(names[k]))
+            {
                 assert_eq!(theirs["key"], ours.parameter.key());
                 assert!(ours.value.map_or(theirs["value"].is_null(), |value| same(&theirs["value"], value)));
             }

@@ -21,7 +21,10 @@ fn foreign_files_are_refused_in_words() {
     writer.write_to_known_channel(&header, b"{}").unwrap();
     writer.finish().unwrap();
     let error = Recording::open(&path).unwrap_err();
-    assert!(matches!(&error, RecordingError::NotARecording { library, .. } if library.contains("mcap")), "{error}");
+    assert!(
+        matches!(&error, RecordingError::NotARecording { library, .. } if library.contains("mcap")),
+        "{error}"
+    );
     assert!(matches!(Recording::open(&folder.path().join("none")).unwrap_err(), RecordingError::Io { .. }));
     assert!(matches!(Recording::open(folder.path()).unwrap_err(), RecordingError::Io { .. }));
 }

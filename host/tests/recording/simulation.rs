@@ -5,10 +5,10 @@ use blindgrasp::record::mcap::{Decoded, Decoder, What};
 use blindgrasp::scene::Scene;
 use blindgrasp::sim::Simulation;
 use blindgrasp::sim::recorder::Recorder;
+use blindgrasp::{MAX_FINGERS, MAX_JOINTS};
 use blindgrasp_shared::link::message::Reply;
 use blindgrasp_shared::telemetry::snapshot::Collector;
 use blindgrasp_shared::tick::{Params, State};
-use blindgrasp::{MAX_FINGERS, MAX_JOINTS};
 use std::path::Path;
 
 fn run(scene: &Scene, path: &Path) -> blindgrasp::sim::Run {

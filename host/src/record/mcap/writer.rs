@@ -213,7 +213,12 @@ impl Writer {
     ///
     /// # Errors
     /// The recording has stopped.
-    pub fn parameters(&mut self, device: Device, at: Stamp, values: &[Setting]) -> Result<(), RecordingError> {
+    pub fn parameters(
+        &mut self,
+        device: Device,
+        at: Stamp,
+        values: &[Setting],
+    ) -> Result<(), RecordingError> {
         let json = Setting::to_json(values).to_string();
         self.write(device, Kind::Parameters, at, json.as_bytes())?;
         self.devices[device.0].track.parameters(values);
@@ -307,7 +312,13 @@ impl Writer {
     ///
     /// # Errors
     /// The recording has stopped.
-    pub fn event(&mut self, device: Device, at: Stamp, level: Level, words: &str) -> Result<(), RecordingError> {
+    pub fn event(
+        &mut self,
+        device: Device,
+        at: Stamp,
+        level: Level,
+        words: &str,
+    ) -> Result<(), RecordingError> {
         self.log(device, at, level, "event", words)?;
         self.settle(at)
     }
@@ -334,8 +345,7 @@ impl Writer {
         let since = recorded.status_at.replace(at).unwrap_or(at);
         status.seconds_s = at.0.saturating_sub(since.0) as f64 / 1e9;
         status.decimation = recorded.decimation.into();
-        status.rate_hz =
-            if status.seconds_s > 0.0 { status.records as f64 / status.seconds_s } else { 0.0 };
+        status.rate_hz = if status.seconds_s > 0.0 { status.records as f64 / status.seconds_s } else { 0.0 };
         status.share = match recorded.baud {
             Some(baud) if status.seconds_s > 0.0 => {
                 BITS_A_BYTE * status.bytes as f64 / (f64::from(baud) * status.seconds_s)
@@ -450,8 +460,7 @@ impl Writer {
 
     fn write_to(&mut self, channel_id: u16, at: Stamp, data: &[u8]) -> Result<(), RecordingError> {
         let sequence = self.counts.entry(channel_id).or_insert(0);
-        let header =
-            MessageHeader { channel_id, sequence: *sequence, log_time: at.0, publish_time: at.0 };
+        let header = MessageHeader { channel_id, sequence: *sequence, log_time: at.0, publish_time: at.0 };
         *sequence = sequence.wrapping_add(1);
         self.mcap()?.write_to_known_channel(&header, data)?;
         self.pending += data.len();
@@ -474,7 +483,9 @@ impl Writer {
                 let (schema, encoding) = match kind {
                     Kind::Received | Kind::Sent => (0, PROFILE),
                     Kind::Event => (mcap.add_schema(schema::LOG, "protobuf", &schema::of_log())?, "protobuf"),
-                    Kind::Link => (mcap.add_schema(schema::LINK, "protobuf", &schema::of_link())?, "protobuf"),
+                    Kind::Link => {
+                        (mcap.add_schema(schema::LINK, "protobuf", &schema::of_link())?, "protobuf")
+                    }
                     Kind::About => {
                         let schema = schema::of_about().to_string();
                         (mcap.add_schema("blindgrasp.About", "jsonschema", schema.as_bytes())?, "json")
@@ -486,7 +497,13 @@ impl Writer {
                     Kind::Tick => continue,
                 };
                 let topic = kind.topic(&name);
-                mcap.add_channel_with_id(kind.channel(Device(k)), schema, &topic, encoding, &BTreeMap::new())?;
+                mcap.add_channel_with_id(
+                    kind.channel(Device(k)),
+                    schema,
+                    &topic,
+                    encoding,
+                    &BTreeMap::new(),
+                )?;
             }
         }
         Ok(())
@@ -520,7 +537,8 @@ impl Writer {
         match mcap.add_channel_with_id(wanted, schema, &topic, "protobuf", &none) {
             // The device had another hand before.
             Err(::mcap::McapError::ConflictingChannels(_)) => {
-                let channel = mcap.add_channel_with_id(u16::MAX - extra, schema, &topic, "protobuf", &none)?;
+                let channel =
+                    mcap.add_channel_with_id(u16::MAX - extra, schema, &topic, "protobuf", &none)?;
                 self.extra_channels += 1;
                 Ok(channel)
             }
