@@ -454,6 +454,17 @@ REPLY = Enum(
 ANY_IDENTITY = Struct(reply=Known([0]), sequence=U16, session=U16, interface_version=U16)
 
 
+class Refused(Trouble):
+    """A request that was refused, and why."""
+
+    def __init__(self, request, refusal):
+        name = request if isinstance(request, str) else next(iter(request))
+        command = request["Command"] if name == "Command" else name
+        told = command if isinstance(command, str) else next(iter(command))
+        super().__init__(f"{told} is refused: {REFUSALS[refusal]}")
+        self.refusal = refusal
+
+
 def told_fault(raised):
     joint = "" if raised["joint"] is None else f"joint {raised['joint']}: "
     return f"fault {raised['fault']}: {joint}{FAULTS[raised['fault']]}"
@@ -743,8 +754,7 @@ class Session:
                     self.look_for_version(body)
                 elif body["sequence"] == sequence:
                     if kind == "Answer" and body["refused"]:
-                        name = request if isinstance(request, str) else json.dumps(request)
-                        raise Trouble(f"{name} is refused: {REFUSALS[body['refused']]}")
+                        raise Refused(request, body["refused"])
                     return reply
             self.beat()
         raise Trouble(f"no answer within {patience_s} s: is it the right port, and does the firmware run?")
@@ -850,7 +860,7 @@ class Lockstep(Session):
             for reply in self.hear(0.1):
                 (kind, body), = reply.items()
                 if kind == "Answer" and body["refused"]:
-                    raise Trouble(f"{request} is refused: {REFUSALS[body['refused']]}")
+                    raise Refused(request, body["refused"])
                 answer = reply if body["sequence"] == sequence else answer
         return answer, self.last_record
 
@@ -994,6 +1004,7 @@ def run_grasp(session, args):
         if not session.pump(10.0, lambda: state() in ("Armed", "Fault")) or state() == "Fault":
             raise Trouble("the release does not end as it should")
         session.command("Disarm")
+        session.pump(PATIENCE_S, lambda: state() == "Disarmed")
     except BaseException:
         session.command("Stop")
         raise

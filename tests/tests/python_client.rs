@@ -245,7 +245,7 @@ mod emulated {
         // There are no encoders: fault 1, and no arming.
         let (code, out, err) = ask(&["grasp", "--hold", "1"]);
         assert_eq!(code, Some(1));
-        assert!(err.contains("\"Arm\"} is refused: the hand is in a fault: clear it first"), "{err}");
+        assert!(err.contains("Arm is refused: the hand is in a fault: clear it first"), "{err}");
         assert!(out.contains("Fault, fault 1: joint 0: encoder gave no sample"), "{out}");
         let (code, _, err) = ask(&["clear"]);
         assert_eq!(code, Some(1));
