@@ -251,6 +251,61 @@ fn a_few_requests_are_asked_at_a_time_and_a_stop_overtakes() {
 }
 
 #[test]
+fn what_is_asked_aside_waits_for_the_user_and_is_answered_aside() {
+    let mut bench = Bench::open();
+    let get = |index| Request::GetParameter { parameter: Parameter::Damping, index };
+    for index in 0..12 {
+        bench.talk.ask_aside(get(index), bench.now);
+    }
+    bench.talk.ask(get(3), bench.now);
+    assert!(!bench.talk.is_idle());
+    bench.command(Command::Stop);
+    bench.run(100).unwrap();
+    let answers: Vec<(bool, u8)> = (bench.events.iter())
+        .filter_map(|event| match event {
+            Event::Answer(Request::GetParameter { index, .. }, Answer::Value(_)) => Some((true, *index)),
+            Event::Aside(Request::GetParameter { index, .. }, Some(Answer::Value(_))) => {
+                Some((false, *index))
+            }
+            _ => None,
+        })
+        .collect();
+    // Four were under way; the stop took the user's place in the queue, and nobody else's.
+    let expected: Vec<(bool, u8)> = (0..12).map(|index| (false, index)).collect();
+    assert_eq!(answers, expected);
+    assert!(bench.has_seen(&Event::Unsent(get(3))) && bench.has_seen(&done(Command::Stop)));
+}
+
+#[test]
+fn a_tapped_talk_tells_every_payload_before_what_it_means() {
+    let mut bench = Bench::new();
+    bench.talk = Talk::new(PATIENCE, bench.now).tapped();
+    bench.run(300).unwrap();
+    bench.events.clear();
+    bench.command(Command::Arm);
+    bench
+        .run_with(1, |board, bytes| {
+            board.take(bytes);
+            [&[3, 3, 0], &board.tick()[..]].concat()
+        })
+        .unwrap();
+    let at = |wanted: &dyn Fn(&Event) -> bool| bench.events.iter().position(wanted).expect("the event");
+    let sent = at(&|event| match event {
+        Event::Sent(payload) => Packet::decode(payload).unwrap().request == Request::Command(Command::Arm),
+        _ => false,
+    });
+    let damaged = at(&|event| *event == Event::Damaged);
+    let received = at(&|event| match event {
+        Event::Received(payload) => {
+            matches!(Reply::<MAX_JOINTS>::decode(payload), Ok(Reply::Answer { refused: None, .. }))
+        }
+        _ => false,
+    });
+    let meaning = at(&|event| *event == done(Command::Arm));
+    assert!(sent < damaged && damaged < received && received < meaning);
+}
+
+#[test]
 fn what_gets_lost_is_told_but_a_stop_is_sent_again() {
     let mut bench = Bench::open();
     bench.command(Command::Arm);
@@ -351,13 +406,23 @@ mod command {
 
     /// The command, at a socket behind which this runs.
     fn start(behind: impl FnOnce(UnixStream) + Send + 'static) -> (Child, TempDir) {
+        start_with(Stdio::piped(), &[], behind)
+    }
+
+    /// The same with another input, and more arguments.
+    fn start_with(
+        stdin: Stdio,
+        arguments: &[&str],
+        behind: impl FnOnce(UnixStream) + Send + 'static,
+    ) -> (Child, TempDir) {
         let folder = TempDir::new().expect("a folder");
         let path = folder.path().join("hand");
         let listener = UnixListener::bind(&path).expect("a socket");
         thread::spawn(move || behind(listener.accept().expect("the command connects").0));
         let child = std::process::Command::new(env!("CARGO_BIN_EXE_blindgrasp"))
             .args(["console", "--port", &format!("unix:{}", path.display())])
-            .stdin(Stdio::piped())
+            .args(arguments)
+            .stdin(stdin)
             .stdout(Stdio::piped())
             .stderr(Stdio::piped())
             .spawn()
@@ -395,6 +460,17 @@ mod command {
     fn type_all(board: Board, script: &str) -> (Output, String, String) {
         let (mut child, _folder) = start(|socket| drop(serve(board, socket, Duration::from_secs(60))));
         child.stdin.take().expect("stdin").write_all(script.as_bytes()).expect("the script is taken");
+        ended(child)
+    }
+
+    /// The same at a terminal.
+    fn type_by_hand(board: Board, lines: &str) -> (Output, String, String) {
+        let terminal = nix::pty::openpty(None, None).expect("a terminal");
+        let (child, _folder) = start_with(Stdio::from(terminal.slave), &[], |socket| {
+            drop(serve(board, socket, Duration::from_secs(60)))
+        });
+        let mut keys = std::fs::File::from(terminal.master);
+        keys.write_all(lines.as_bytes()).expect("the lines are taken");
         ended(child)
     }
 
@@ -438,8 +514,8 @@ mod command {
     #[test]
     fn refusals_and_mistakes_are_told_in_words() {
         let script = "graps\ngrasp\nset limits.torque_nm 0.05\nget limits.torque_nm 3\nget force_m\nset force_n x\n\
-            get damping_nm_s 200\narm\nset force_n 1\nset\nwatch 1\n";
-        let (output, said, errors) = type_all(Board::new(), script);
+            get damping_nm_s 200\narm\nset force_n 1\nset\nwatch 1\nquit\n";
+        let (output, said, errors) = type_by_hand(Board::new(), script);
         assert_eq!(output.status.code(), Some(0));
         let lines = [
             "grasp: refused, the hand is disarmed: arm it first",
@@ -464,6 +540,66 @@ mod command {
     }
 
     #[test]
+    fn a_script_ends_at_the_first_line_that_is_refused() {
+        let (output, said, errors) = type_all(Board::new(), "arm\n\nset force_n 1\ngrasp\nstatus\n");
+        assert_eq!(output.status.code(), Some(1), "{errors}");
+        assert_lines(&said, &["arm: done", "force_n = 1: refused, ", "stop: done"]);
+        assert!(!said.contains("grasp:") && !said.contains("mode  "), "{said}");
+        assert_eq!(errors, "blindgrasp: line 3 of the script was not done, which ends it\n");
+    }
+
+    #[test]
+    fn a_script_ends_at_the_first_line_that_is_not_understood() {
+        let (output, said, errors) = type_all(Board::new(), "arm\ngraps\ngrasp\n");
+        assert_eq!(output.status.code(), Some(2), "{errors}");
+        assert_lines(&said, &["arm: done", "stop: done"]);
+        assert!(!said.contains("grasp:"), "{said}");
+        let wanted = "line 2 of the script, which ends it: `graps` is no command: did you mean `grasp`?";
+        assert!(errors.ends_with(&format!("{wanted}\n")) && errors.lines().count() == 1, "{errors}");
+    }
+
+    #[test]
+    fn a_script_ends_at_the_first_line_that_is_not_answered() {
+        let (mut child, _folder) = start(|mut socket| {
+            let mut board = Board::new();
+            socket.set_read_timeout(Some(Duration::from_millis(1))).expect("a timeout");
+            let begun = Instant::now();
+            let mut bytes = [0; 512];
+            while begun.elapsed() < Duration::from_secs(30) {
+                match socket.read(&mut bytes) {
+                    Ok(0) => return,
+                    Ok(count) => board.take(&bytes[..count]),
+                    Err(_) => {}
+                }
+                // Arming gets lost on the way.
+                board.waiting.retain(|packet| packet.request != Request::Command(Command::Arm));
+                let _ = socket.write_all(&board.tick());
+            }
+        });
+        child.stdin.take().expect("stdin").write_all(b"arm\ngrasp\n").expect("the script is taken");
+        let (output, said, errors) = ended(child);
+        assert_eq!(output.status.code(), Some(1), "{errors}");
+        assert!(
+            errors.contains("arm: no answer; ") && errors.contains("line 1 of the script was not done"),
+            "{errors}"
+        );
+        assert!(said.contains("stop: done") && !said.contains("grasp:"), "{said}");
+    }
+
+    #[test]
+    fn without_a_port_the_ports_are_told() {
+        for command in [&["console"][..], &["record", "--out", "no.mcap"]] {
+            let output = std::process::Command::new(env!("CARGO_BIN_EXE_blindgrasp"))
+                .args(command)
+                .output()
+                .expect("the command starts");
+            assert_eq!(output.status.code(), Some(2));
+            let errors = String::from_utf8_lossy(&output.stderr);
+            assert!(errors.contains("which port? Name it with --port; this machine has "), "{errors}");
+        }
+    }
+
+    #[test]
     fn every_parameter_is_shown() {
         let (output, said, _) = type_all(Board::new(), "get\nhelp\n");
         assert_eq!(output.status.code(), Some(0));
@@ -477,7 +613,7 @@ mod command {
     fn a_fault_is_told_with_its_remedy_and_is_not_cleared_while_its_cause_is_there() {
         let mut board = Board::new();
         board.reading = Reading::Failed(Raised::at(0, Fault::SampleMissing));
-        let (output, said, _) = type_all(board, "status\narm\nclear\n");
+        let (output, said, _) = type_by_hand(board, "status\narm\nclear\nquit\n");
         assert_eq!(output.status.code(), Some(0));
         let fault = "fault 1: joint 0: encoder gave no sample; check the encoder's wiring and supply";
         assert_lines(

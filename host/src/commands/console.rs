@@ -1,17 +1,19 @@
 //! `blindgrasp console`: words for a hand, and what it answers.
 
-use super::Outcome;
+use super::{Outcome, ports};
 use anyhow::{Context, anyhow, bail};
 use blindgrasp::device::client::{Answer, Firmware, Record, Request};
-use blindgrasp::device::talk::{self, Event, SELDOM, Talk, TalkError, telemetry};
+use blindgrasp::device::recorder::{Recorder, Recording};
+use blindgrasp::device::talk::{self, Event, SELDOM, Talk, telemetry};
 use blindgrasp::device::transport::{Transport, TransportError};
 use blindgrasp::scene::HandModel;
-use blindgrasp_shared::command::{self, Command, Grasp};
+use blindgrasp_shared::command::{self, Command, Grasp, Refusal};
 use blindgrasp_shared::settings::{Each, Parameter};
 use clap::Args;
 use std::collections::VecDeque;
 use std::fmt::{Display, Write as _};
 use std::io::{self, BufRead as _, IsTerminal as _, Write as _};
+use std::path::PathBuf;
 use std::sync::atomic::{AtomicU32, Ordering};
 use std::sync::mpsc::{self, Receiver, TryRecvError};
 use std::thread;
@@ -21,6 +23,8 @@ use std::time::{Duration, Instant};
 const SLICE: Duration = Duration::from_millis(10);
 /// How long a line may take no bytes.
 const SENDING: Duration = Duration::from_secs(1);
+/// Ticks from one recorded record to the next.
+const EVERY_TICK: u16 = 1;
 /// What can be typed, and what it does.
 const WORDS: [(&str, &str, &str); 12] = [
     ("help", "", "show this"),
@@ -41,23 +45,37 @@ const WORDS: [(&str, &str, &str); 12] = [
 ///
 /// Type `help` for the commands; they are taken one by one, from a terminal or a script. The heartbeat is kept all the
 /// time. Ctrl-C stops the hand, a second one ends the program, as the end of the input does; the hand is stopped first.
+/// A script ends, and the hand is stopped, at the first line that is refused, not answered, or not understood.
 ///
-/// Exit code 0: ended, and the hand has confirmed the stop; 2: bad usage, nobody answers, or the line was lost.
+/// Exit code 0: ended, and the hand has confirmed the stop; 1: the same, but a line of a script was refused, or something
+/// is missing in the recording; 2: bad usage, nobody answers, or the line was lost.
 #[derive(Args)]
 pub(crate) struct Arguments {
     /// A serial port (/dev/ttyUSB0, COM3), or unix:PATH for a socket at which somebody listens
     #[arg(long, value_name = "PORT")]
-    port: String,
+    port: Option<String>,
     /// The hand's file, if it is not built in: for angles and the joints' names
     #[arg(long, value_name = "HAND")]
     hand: Option<String>,
+    /// Record everything that goes over the line, every tick included
+    #[arg(long, value_name = "FILE.mcap")]
+    out: Option<PathBuf>,
+    /// Overwrite the recording
+    #[arg(long, requires = "out")]
+    force: bool,
 }
 
 static INTERRUPTS: AtomicU32 = AtomicU32::new(0);
 
 /// Runs the command.
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
-    let mut line = talk::open(&arguments.port)?;
+    let port = ports::given(arguments.port.as_deref())?;
+    let mut line = talk::open(port)?;
+    let recording =
+        (arguments.out.as_ref()).map(|path| Recording::create(path, arguments.force)).transpose()?;
+    let recorder = recording
+        .as_ref()
+        .map(|recording| recording.add("hand", port, arguments.hand.as_slice(), EVERY_TICK));
     // Without the handler Ctrl-C ends the program; the hand then lets go for want of a heartbeat.
     let _ = ctrlc::set_handler(|| {
         if INTERRUPTS.fetch_add(1, Ordering::Relaxed) >= 2 {
@@ -65,7 +83,11 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
         }
     });
     let mut console = Console {
-        talk: Talk::new(talk::PATIENCE, Instant::now()),
+        talk: match recorder {
+            Some(_) => Talk::new(talk::PATIENCE, Instant::now()).tapped(),
+            None => Talk::new(talk::PATIENCE, Instant::now()),
+        },
+        recorder,
         wanted_hand: arguments.hand.clone(),
         typed: Typed::listen(),
         joint_count: 0,
@@ -77,21 +99,50 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
         interrupts: 0,
         is_quitting: false,
         is_over: false,
+        broken: None,
     };
-    let ended = console.run(&mut *line).with_context(|| format!("port {}", arguments.port));
+    let ended = console.run(&mut *line).with_context(|| format!("port {port}"));
     if ended.is_err() {
         // Whatever it was: nobody leads the hand any more. If the line is gone, so is the heartbeat.
         let now = Instant::now();
         console.talk.ask(Request::Command(Command::Stop), now);
         let _ = line.send(&console.talk.outgoing(), now + SENDING);
     }
-    ended.map(|()| Outcome::Shown)
+    let whole = console.recorder.as_mut().map(|recorder| {
+        let finished = recorder.finish(Instant::now());
+        finished.map(|()| recorder.totals().is_whole())
+    });
+    if let (Some(recording), Some(path)) = (recording, &arguments.out) {
+        let saved = recording.finish()?;
+        eprintln!("blindgrasp: recorded {}: {saved}", path.display());
+    }
+    ended?;
+    let whole = whole.transpose()?.unwrap_or(true);
+    if !whole {
+        eprintln!("blindgrasp: something is missing in the recording, which says what");
+    }
+    match console.broken {
+        Some(Broken::Misunderstood(error)) => Err(error),
+        Some(Broken::Refused) => Ok(Outcome::Failed),
+        None if !whole => Ok(Outcome::Failed),
+        None => Ok(Outcome::Shown),
+    }
+}
+
+/// Why a script ended early.
+enum Broken {
+    /// What a line asked for was not done.
+    Refused,
+    /// A line has no meaning.
+    Misunderstood(anyhow::Error),
 }
 
 /// Lines from stdin.
 struct Typed {
     incoming: Receiver<String>,
     lines: VecDeque<String>,
+    /// Number of the line that was taken last.
+    number: usize,
     has_ended: bool,
     by_hand: bool,
 }
@@ -103,7 +154,8 @@ impl Typed {
         thread::spawn(move || {
             io::stdin().lock().lines().map_while(Result::ok).try_for_each(|line| lines.send(line))
         });
-        Self { incoming, lines: VecDeque::new(), has_ended: false, by_hand: io::stdin().is_terminal() }
+        let by_hand = io::stdin().is_terminal();
+        Self { incoming, lines: VecDeque::new(), number: 0, has_ended: false, by_hand }
     }
 
     fn look(&mut self) {
@@ -132,6 +184,7 @@ enum Status {
 
 struct Console {
     talk: Talk,
+    recorder: Option<Recorder>,
     wanted_hand: Option<String>,
     typed: Typed,
     joint_count: usize,
@@ -147,6 +200,8 @@ struct Console {
     interrupts: u32,
     is_quitting: bool,
     is_over: bool,
+    /// Why the script ends early, if it does.
+    broken: Option<Broken>,
 }
 
 impl Console {
@@ -154,9 +209,15 @@ impl Console {
         let mut buffer = [0; 4096];
         loop {
             let now = Instant::now();
-            self.talk.turn(now).map_err(explained)?;
+            self.talk.turn(now).map_err(ports::explained)?;
             while let Some(event) = self.talk.event() {
-                self.show(event)?;
+                if let Some(recorder) = &mut self.recorder {
+                    recorder.take(&event, &mut self.talk, now)?;
+                }
+                self.show(event, now)?;
+            }
+            if let Some(recorder) = &mut self.recorder {
+                recorder.turn(&mut self.talk, now)?;
             }
             if self.is_over {
                 return Ok(());
@@ -185,11 +246,19 @@ impl Console {
             self.typed.lines.clear();
             self.stop(false, now);
         }
-        if self.talk.is_idle() && self.status == Status::Shown && !self.is_quitting {
+        let is_ready = self.recorder.as_ref().is_none_or(Recorder::is_ready);
+        if self.talk.is_idle() && is_ready && self.status == Status::Shown && !self.is_quitting {
             match self.typed.lines.pop_front() {
                 Some(line) => {
-                    if let Err(error) = self.execute(&line, now) {
-                        eprintln!("blindgrasp: {error:#}");
+                    self.typed.number += 1;
+                    match self.execute(&line, now) {
+                        Err(error) if self.typed.by_hand => eprintln!("blindgrasp: {error:#}"),
+                        Err(error) => {
+                            let number = self.typed.number;
+                            let error = error.context(format!("line {number} of the script, which ends it"));
+                            self.break_off(Broken::Misunderstood(error), now);
+                        }
+                        Ok(()) => {}
                     }
                 }
                 None if self.typed.has_ended => self.stop(true, now),
@@ -202,6 +271,25 @@ impl Console {
     fn stop(&mut self, quit: bool, now: Instant) {
         self.is_quitting |= quit;
         self.talk.ask(Request::Command(Command::Stop), now);
+    }
+
+    /// Ends a script whose next lines count on one that was not done.
+    fn break_off(&mut self, broken: Broken, now: Instant) {
+        if !self.is_quitting {
+            self.broken = Some(broken);
+            self.typed.lines.clear();
+            self.stop(true, now);
+        }
+    }
+
+    /// The same for a request that was not done; what is switched off has no value to show, which is no failure.
+    fn not_done(&mut self, request: &Request, answer: Option<&Answer>, now: Instant) {
+        let is_shown = matches!(request, Request::GetParameter { .. })
+            && answer == Some(&Answer::Refused(Refusal::SwitchedOff));
+        if !self.typed.by_hand && !is_shown && !self.is_quitting {
+            eprintln!("blindgrasp: line {} of the script was not done, which ends it", self.typed.number);
+            self.break_off(Broken::Refused, now);
+        }
     }
 
     fn execute(&mut self, line: &str, now: Instant) -> anyhow::Result<()> {
@@ -225,7 +313,7 @@ impl Console {
             }
             ("status", []) => {
                 self.status = Status::Asked;
-                self.talk.ask(telemetry(self.decimation()), now);
+                self.talk.ask(self.telemetry(), now);
                 return Ok(());
             }
             ("quit", []) => {
@@ -234,7 +322,7 @@ impl Console {
             }
             ("watch", [interval]) => {
                 self.watch(interval)?;
-                self.talk.ask(telemetry(self.decimation()), now);
+                self.talk.ask(self.telemetry(), now);
                 return Ok(());
             }
             ("get", []) => return self.get(Parameter::ALL, None, now),
@@ -296,12 +384,16 @@ impl Console {
         Ok(())
     }
 
-    /// Ticks from one record to the next.
-    fn decimation(&self) -> u16 {
-        self.watch_ticks.and_then(|ticks| u16::try_from(ticks).ok()).map_or(SELDOM, |ticks| ticks.min(SELDOM))
+    /// The request for as many records as are shown, or recorded.
+    fn telemetry(&self) -> Request {
+        let shown = self.watch_ticks.and_then(|ticks| u16::try_from(ticks).ok());
+        match &self.recorder {
+            Some(recorder) => recorder.telemetry(),
+            None => telemetry(shown.map_or(SELDOM, |ticks| ticks.min(SELDOM))),
+        }
     }
 
-    fn show(&mut self, event: Event) -> anyhow::Result<()> {
+    fn show(&mut self, event: Event, now: Instant) -> anyhow::Result<()> {
         match event {
             Event::Open { firmware, period_us } => self.greet(&firmware, period_us),
             Event::StartedAnew => {
@@ -332,7 +424,11 @@ impl Console {
                     }
                     _ => {}
                 }
-                say(answered(&request, &answer))
+                say(answered(&request, &answer))?;
+                if let Answer::Refused(_) = answer {
+                    self.not_done(&request, Some(&answer), now);
+                }
+                Ok(())
             }
             Event::Unsent(request) => say(format_args!("{}: not sent, because of stop", name(&request))),
             Event::Unanswered(Request::Command(Command::Stop)) => {
@@ -346,9 +442,11 @@ impl Console {
             Event::Unanswered(request) => {
                 self.status = Status::Shown;
                 eprintln!("blindgrasp: {}: no answer; whether it was done is not known", name(&request));
+                self.not_done(&request, None, now);
                 Ok(())
             }
             Event::Record(record) => self.look(&record),
+            Event::Aside(..) | Event::Received(_) | Event::Sent(_) | Event::Damaged => Ok(()),
         }
     }
 
@@ -455,22 +553,6 @@ fn say(line: impl Display) -> anyhow::Result<()> {
 /// Why the line ended.
 fn lost(error: TransportError) -> anyhow::Error {
     anyhow!(error).context("the line is lost")
-}
-
-/// Why nobody answers, with the ports that there are.
-fn explained(error: TalkError) -> anyhow::Error {
-    let is_alone = matches!(error, TalkError::NobodyThere(..));
-    match serial_ports() {
-        Some(ports) if is_alone => anyhow!("{error}; this machine has the serial ports {ports}"),
-        _ if is_alone => anyhow!("{error}; this machine has no serial ports"),
-        _ => error.into(),
-    }
-}
-
-fn serial_ports() -> Option<String> {
-    let mut ports = serial2::SerialPort::available_ports().ok().filter(|ports| !ports.is_empty())?;
-    ports.sort();
-    Some(ports.iter().map(|port| port.display().to_string()).collect::<Vec<_>>().join(", "))
 }
 
 /// What was asked for, as it was typed.

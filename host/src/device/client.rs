@@ -105,6 +105,13 @@ pub enum Answer {
     Refused(Refusal),
     /// To `GetParameter`.
     Value(f32),
+    /// To `Burst`.
+    Burst {
+        /// How many records there are.
+        count: u16,
+        /// The one that was asked for.
+        record: Box<Record>,
+    },
 }
 
 /// What came of a tick.
@@ -332,7 +339,9 @@ impl<T: Transport> Client<T> {
                     (sequence, refused.map_or(Answer::Done, Answer::Refused))
                 }
                 Ok(Reply::Value { sequence, value, .. }) => (sequence, Answer::Value(value)),
-                Ok(Reply::Burst { sequence, .. }) => (sequence, Answer::Done),
+                Ok(Reply::Burst { sequence, count, record, .. }) => {
+                    (sequence, Answer::Burst { count, record: Box::new(record) })
+                }
                 // The image for processor in the loop sends none.
                 Ok(Reply::Snapshot(_)) => {
                     self.traffic.frames_unexpected += 1;

@@ -5,7 +5,9 @@
 //! - Processor in the loop, from the ground up: [`interrupt`], whether the user wants an end; [`transport`], bytes to and
 //!   from; `qemu`, the emulator as a process; [`client`], messages and answers; [`twin`], the firmware's double on the host;
 //!   [`compare`], whether they are one; [`pil`], a hand in a simulation whose controller is the firmware.
-//! - [`talk`]: a session with a hand whose joints are real.
+//! - [`talk`]: a session with a hand whose joints are real; [`recorder`]: a recording of it.
+//! - A hand for those who have none, from the ground up: [`simulated`], device and world, a tick at a time; [`line`](mod@line), the
+//!   firmware's queues; `pty`, a serial port that is none; `serve`, all of it in real time.
 
 pub mod build;
 pub mod client;
@@ -14,9 +16,16 @@ pub mod compare;
 pub mod flash;
 pub mod image;
 pub mod interrupt;
+pub mod line;
 pub mod pil;
 #[cfg(unix)]
+pub mod pty;
+#[cfg(unix)]
 pub mod qemu;
+pub mod recorder;
+#[cfg(unix)]
+pub mod serve;
+pub mod simulated;
 pub mod talk;
 pub mod transport;
 pub mod twin;

@@ -143,6 +143,16 @@ impl Plan {
         }
         Ok(Self { params: Params::new(scene.hand.cast(), &config)?, hand })
     }
+
+    /// The scene's parameters, with the heartbeat that the hand wants of a host.
+    ///
+    /// # Errors
+    /// The first that the controller refuses.
+    pub fn with_heartbeat(&self) -> Result<Params<f32, MAX_JOINTS, MAX_FINGERS>, ParameterError> {
+        let mut config = *self.params.config();
+        config.faults.heartbeat_ms = self.hand.config.faults.heartbeat_ms;
+        Params::new(self.params.hand().clone(), &config)
+    }
 }
 
 /// A device that does a tick for each sample of joints.

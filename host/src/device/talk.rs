@@ -5,6 +5,9 @@
 //! it is heard, and then keeps the heartbeat going; a hand with torque lets go without it. What is asked is asked a few at a
 //! time, because the firmware has little room, and told when it is not answered; only `Stop`, which may be repeated, is
 //! sent again, and ahead of all that waits. A device that was reset knows nothing of the session: another one begins.
+//!
+//! Beside the talk of a user something else may go on that he does not see: what is asked aside waits for what he asks, and is
+//! answered aside. Who records takes a talk that is tapped, which tells every payload that goes over the line.
 
 use super::client::{Answer, Firmware, Packet, Patience, Record, Request, Traffic};
 #[cfg(unix)]
@@ -14,7 +17,7 @@ use crate::MAX_JOINTS;
 use blindgrasp_shared::command::{Command, Refusal};
 use blindgrasp_shared::fault::Raised;
 use blindgrasp_shared::link::message::{Reply, Signals};
-use blindgrasp_shared::link::{Receiver, encode, most_bytes};
+use blindgrasp_shared::link::{HearError, Listener, Receiver, encode, most_bytes};
 use blindgrasp_shared::settings::Parameter;
 use blindgrasp_shared::supervisor::Mode;
 use blindgrasp_shared::telemetry::INTERFACE_VERSION;
@@ -74,6 +77,14 @@ pub enum Event {
     Fault(Option<Raised>),
     /// A record came.
     Record(Record),
+    /// A request that was asked aside was answered; `None`: not in time.
+    Aside(Request, Option<Answer>),
+    /// A good frame came, with this payload. Told by a tapped talk, before what follows from it.
+    Received(Vec<u8>),
+    /// A frame with this payload is sent. Told by a tapped talk.
+    Sent(Vec<u8>),
+    /// A damaged frame came. Told by a tapped talk.
+    Damaged,
 }
 
 /// Why there is no talk any more.
@@ -109,12 +120,20 @@ fn heard(traffic: &Traffic) -> String {
     }
 }
 
+/// Who wants to know what becomes of a request.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Asker {
+    /// Nobody but the talk itself.
+    Talk,
+    User,
+    Aside,
+}
+
 /// A request that was sent.
 struct Asked {
     sequence: u16,
     request: Request,
-    /// Whether the user wants to know what becomes of it.
-    told: bool,
+    asker: Asker,
     deadline: Instant,
     /// How often it may still be sent.
     again: u8,
@@ -124,6 +143,10 @@ struct Asked {
 pub struct Talk {
     patience: Patience,
     receiver: Receiver<MOST_RECEIVED>,
+    listener: Listener<MAX_JOINTS>,
+    /// Payload of the last good frame.
+    payload: Vec<u8>,
+    tapped: bool,
     /// Number of the session, if there is one.
     session: Option<u16>,
     /// Number of the last request.
@@ -135,7 +158,9 @@ pub struct Talk {
     /// When the next hello, or heartbeat, is due.
     due: Instant,
     heartbeat: Duration,
-    waiting: VecDeque<(Request, bool)>,
+    waiting: VecDeque<(Request, Asker)>,
+    /// What waits for those.
+    aside: VecDeque<Request>,
     asked: Vec<Asked>,
     outgoing: Vec<u8>,
     events: VecDeque<Event>,
@@ -150,6 +175,9 @@ impl Talk {
         Self {
             patience,
             receiver: Receiver::new(),
+            listener: Listener::new(),
+            payload: Vec::new(),
+            tapped: false,
             session: None,
             sequence: 0,
             begun: now,
@@ -157,6 +185,7 @@ impl Talk {
             due: now,
             heartbeat: HEARTBEAT,
             waiting: VecDeque::new(),
+            aside: VecDeque::new(),
             asked: Vec::new(),
             outgoing: Vec::new(),
             events: VecDeque::new(),
@@ -165,16 +194,31 @@ impl Talk {
         }
     }
 
+    /// The same, telling every payload that goes over the line.
+    #[must_use]
+    pub fn tapped(mut self) -> Self {
+        self.tapped = true;
+        self
+    }
+
     /// Asks for something. `Stop` goes at once, session or not, and takes the place of all that waits.
     pub fn ask(&mut self, request: Request, now: Instant) {
         if request == Request::Command(Command::Stop) {
-            let unsent = self.waiting.drain(..).filter(|&(_, told)| told);
-            self.events.extend(unsent.map(|(request, _)| Event::Unsent(request)));
-            self.send(request, true, STOPS, now);
+            let (unsent, kept) = self.waiting.drain(..).partition(|&(_, asker)| asker == Asker::User);
+            self.waiting = kept;
+            let unsent: VecDeque<(Request, Asker)> = unsent;
+            self.events.extend(unsent.into_iter().map(|(request, _)| Event::Unsent(request)));
+            self.send(request, Asker::User, STOPS, now);
         } else {
-            self.waiting.push_back((request, true));
+            self.waiting.push_back((request, Asker::User));
             self.send_waiting(now);
         }
+    }
+
+    /// Asks for something besides: what the user asks goes before it, and does not wait for it.
+    pub fn ask_aside(&mut self, request: Request, now: Instant) {
+        self.aside.push_back(request);
+        self.send_waiting(now);
     }
 
     /// Takes bytes that came.
@@ -183,25 +227,39 @@ impl Talk {
     /// If they come from a firmware of another interface version.
     pub fn take(&mut self, bytes: &[u8], now: Instant) -> Result<(), TalkError> {
         self.traffic.bytes_received += bytes.len() as u64;
+        // Kept from one call to the next: frames come a thousand times a second.
+        let mut payload = std::mem::take(&mut self.payload);
         for &byte in bytes {
-            let payload = match self.receiver.push(byte) {
+            match self.receiver.push(byte) {
                 None => continue,
-                Some(Ok(payload)) => payload.to_vec(),
+                Some(Ok(good)) => {
+                    payload.clear();
+                    payload.extend_from_slice(good);
+                }
                 Some(Err(_)) => {
                     self.traffic.frames_damaged += 1;
+                    if self.tapped {
+                        self.events.push_back(Event::Damaged);
+                    }
                     continue;
                 }
-            };
+            }
             self.traffic.frames_received += 1;
             self.heard = now;
-            match Reply::<MAX_JOINTS>::decode(&payload) {
-                Ok(reply) => self.hear(reply, now)?,
-                Err(_) => match other_interface(&payload) {
+            if self.tapped {
+                self.events.push_back(Event::Received(payload.clone()));
+            }
+            match self.listener.hear(&payload) {
+                Ok(heard) => self.hear(heard.reply, now)?,
+                Err(HearError::Decode(_)) => match other_interface(&payload) {
                     Some(theirs) => return Err(TalkError::OtherInterface { theirs }),
                     None => self.traffic.frames_unexpected += 1,
                 },
+                // One that can't be read without those that are missing, which the next full record helps.
+                Err(HearError::NoFullRecord | HearError::Lost) => {}
             }
         }
+        self.payload = payload;
         self.send_waiting(now);
         Ok(())
     }
@@ -223,11 +281,12 @@ impl Talk {
         let (late, asked) = self.asked.drain(..).partition(|asked| asked.deadline <= now);
         self.asked = asked;
         let late: Vec<Asked> = late;
-        for Asked { request, told, again, .. } in late {
-            if again > 0 {
-                self.send(request, told, again, now);
-            } else if told {
-                self.events.push_back(Event::Unanswered(request));
+        for Asked { request, asker, again, .. } in late {
+            match asker {
+                _ if again > 0 => self.send(request, asker, again, now),
+                Asker::Talk => {}
+                Asker::User => self.events.push_back(Event::Unanswered(request)),
+                Asker::Aside => self.events.push_back(Event::Aside(request, None)),
             }
         }
         if now >= self.due {
@@ -244,7 +303,7 @@ impl Talk {
                     Request::Heartbeat
                 }
             };
-            self.send(request, false, 1, now);
+            self.send(request, Asker::Talk, 1, now);
         }
         self.send_waiting(now);
         Ok(())
@@ -268,7 +327,9 @@ impl Talk {
 
     /// Whether there is a session, and everything that was asked is answered.
     pub fn is_idle(&self) -> bool {
-        self.session.is_some() && self.waiting.is_empty() && !self.asked.iter().any(|asked| asked.told)
+        self.session.is_some()
+            && self.waiting.is_empty()
+            && !self.asked.iter().any(|asked| asked.asker == Asker::User)
     }
 
     /// What went over the line.
@@ -280,14 +341,15 @@ impl Talk {
         let busy = |asked: &&Asked| asked.request != Request::Heartbeat;
         while self.session.is_some()
             && self.asked.iter().filter(busy).count() < WINDOW
-            && let Some((request, told)) = self.waiting.pop_front()
+            && let Some((request, asker)) = (self.waiting.pop_front())
+                .or_else(|| self.aside.pop_front().map(|request| (request, Asker::Aside)))
         {
-            self.send(request, told, 1, now);
+            self.send(request, asker, 1, now);
         }
     }
 
     /// Sends a request, the first of so many times.
-    fn send(&mut self, request: Request, told: bool, times: u8, now: Instant) {
+    fn send(&mut self, request: Request, asker: Asker, times: u8, now: Instant) {
         self.sequence = self.sequence.wrapping_add(1);
         let sequence = self.sequence;
         let packet = Packet { session: self.session.unwrap_or(0), sequence, request };
@@ -297,9 +359,16 @@ impl Talk {
             self.outgoing.extend_from_slice(frame);
             self.traffic.frames_sent += 1;
         }
+        if self.tapped {
+            let mut payload = [0; Packet::MOST_BYTES];
+            // As above.
+            if let Ok(payload) = postcard::to_slice(&packet, &mut payload) {
+                self.events.push_back(Event::Sent(payload.to_vec()));
+            }
+        }
         let wait = if times > 1 { STOP_AGAIN } else { self.patience.answer };
         let request = packet.request;
-        self.asked.push(Asked { sequence, request, told, deadline: now + wait, again: times - 1 });
+        self.asked.push(Asked { sequence, request, asker, deadline: now + wait, again: times - 1 });
     }
 
     fn hear(&mut self, reply: Reply<'_, MAX_JOINTS>, now: Instant) -> Result<(), TalkError> {
@@ -322,7 +391,10 @@ impl Talk {
             }
             Reply::Answer { sequence, refused } => (sequence, refused.map_or(Answer::Done, Answer::Refused)),
             Reply::Value { sequence, value, .. } => (sequence, Answer::Value(value)),
-            Reply::Burst { sequence, .. } => (sequence, Answer::Done),
+            Reply::Burst { sequence, count, record, .. } => {
+                (sequence, Answer::Burst { count, record: Box::new(record) })
+            }
+            // For those who record.
             Reply::Snapshot(_) => return Ok(()),
         };
         let Some(asked) = self.take_asked(sequence) else { return Ok(()) };
@@ -331,7 +403,7 @@ impl Talk {
             self.asked.push(asked);
             return Ok(());
         }
-        let Asked { request, told, .. } = asked;
+        let Asked { request, asker, .. } = asked;
         let heartbeat_ms = match (&request, &answer) {
             (Request::GetParameter { parameter: Parameter::HeartbeatTime, .. }, &Answer::Value(ms)) => {
                 Some(ms)
@@ -346,8 +418,10 @@ impl Talk {
             self.due = self.due.min(now + self.heartbeat);
         }
         let is_forgotten = answer == Answer::Refused(Refusal::NoSession);
-        if told {
-            self.events.push_back(Event::Answer(request, answer));
+        match asker {
+            Asker::Talk => {}
+            Asker::User => self.events.push_back(Event::Answer(request, answer)),
+            Asker::Aside => self.events.push_back(Event::Aside(request, Some(answer))),
         }
         if is_forgotten {
             self.start_anew(now);
@@ -366,19 +440,24 @@ impl Talk {
 
     fn open(&mut self, session: u16, now: Instant) {
         self.session = Some(session);
+        self.listener = Listener::new();
         (self.heartbeat, self.due) = (HEARTBEAT, now);
         let heartbeat = Request::GetParameter { parameter: Parameter::HeartbeatTime, index: 0 };
         // Ahead of what the user asked for meanwhile.
-        self.waiting.push_front((telemetry(SELDOM), false));
-        self.waiting.push_front((heartbeat, false));
+        self.waiting.push_front((telemetry(SELDOM), Asker::Talk));
+        self.waiting.push_front((heartbeat, Asker::Talk));
     }
 
     fn start_anew(&mut self, now: Instant) {
         self.session = None;
         (self.begun, self.due, self.state) = (now, now, None);
+        self.listener = Listener::new();
         self.events.push_back(Event::StartedAnew);
+        // Who asked aside begins anew, too.
+        self.aside.clear();
         let (asked, waiting) = (self.asked.drain(..), self.waiting.drain(..));
-        let lost = asked.map(|asked| (asked.request, asked.told)).chain(waiting).filter(|&(_, told)| told);
+        let lost = asked.map(|asked| (asked.request, asked.asker)).chain(waiting);
+        let lost = lost.filter(|&(_, asker)| asker == Asker::User);
         self.events.extend(lost.map(|(request, _)| Event::Unanswered(request)));
     }
 
@@ -422,7 +501,7 @@ pub enum LineError {
 ///
 /// # Errors
 /// If it can't be opened.
-pub fn open(port: &str) -> Result<Box<dyn Transport>, LineError> {
+pub fn open(port: &str) -> Result<Box<dyn Transport + Send>, LineError> {
     #[cfg(unix)]
     if let Some(path) = port.strip_prefix("unix:") {
         let connect = || {

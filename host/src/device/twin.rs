@@ -63,7 +63,9 @@ impl Twin {
             }
             Some(Reply::Answer { refused, .. }) => Some(refused.map_or(Answer::Done, Answer::Refused)),
             Some(Reply::Value { value, .. }) => Some(Answer::Value(value)),
-            Some(Reply::Burst { .. }) => Some(Answer::Done),
+            Some(Reply::Burst { count, record, .. }) => {
+                Some(Answer::Burst { count, record: Box::new(record) })
+            }
         };
         Turned { answer, record: outputs.record }
     }

@@ -44,6 +44,14 @@ impl HandModel {
     /// # Errors
     /// One line: where, which key, what is wrong, what to do.
     pub fn load(name_or_path: &str) -> std::result::Result<Self, SceneError> {
+        Self::load_with_file(name_or_path).map(|(model, _)| model)
+    }
+
+    /// The same, with all that its file says.
+    ///
+    /// # Errors
+    /// As [`Self::load`].
+    pub fn load_with_file(name_or_path: &str) -> std::result::Result<(Self, HandFile), SceneError> {
         let whole = Place::whole(name_or_path);
         let document = Document::open(Kind::Hand, name_or_path, Path::new(""));
         Self::from_document(document.map_err(|error| error.at(&whole))?)
@@ -54,21 +62,22 @@ impl HandModel {
     /// # Errors
     /// As [`Self::load`].
     pub fn parse(text: &str, source: &str) -> std::result::Result<Self, SceneError> {
-        Self::from_document(Document::parse(text, source, Path::new(""))?)
+        Self::from_document(Document::parse(text, source, Path::new(""))?).map(|(model, _)| model)
     }
 
-    fn from_document(document: Document) -> std::result::Result<Self, SceneError> {
+    fn from_document(document: Document) -> std::result::Result<(Self, HandFile), SceneError> {
         let mut tree = document.node;
         complete_hand(&mut tree);
-        let file = read(&tree, "")?;
-        Self::build(&file).map_err(|mut error| {
+        let file: HandFile = read(&tree, "")?;
+        let model = Self::build(&file).map_err(|mut error| {
             // The checks know the keys of a scene.
             if let Some(key) = error.key.strip_prefix("hand.") {
                 error.key = key.into();
             }
             let place = tree.place_of(&error.key).clone();
             error.at(&place)
-        })
+        })?;
+        Ok((model, file))
     }
 
     /// The hand of a scene, with the configuration of its own file.

@@ -7,7 +7,7 @@ use std::f64::consts::TAU;
 
 /// One a joint.
 #[derive(Clone, Debug)]
-pub(super) struct Encoders {
+pub(crate) struct Encoders {
     joint_count: usize,
     counts_per_rad: JointVector,
     noise_counts: f64,
@@ -15,7 +15,7 @@ pub(super) struct Encoders {
 }
 
 impl Encoders {
-    pub(super) fn new(scene: &Scene) -> Self {
+    pub(crate) fn new(scene: &Scene) -> Self {
         let mut counts_per_rad = [0.0; MAX_JOINTS];
         for (counts, joint) in counts_per_rad.iter_mut().zip(&scene.joints) {
             *counts = joint.encoder_counts_per_turn / TAU;
@@ -29,7 +29,7 @@ impl Encoders {
     }
 
     /// The counts at this instant; zero beyond the hand's joints.
-    pub(super) fn read(&mut self, angles_rad: &JointVector) -> [i32; MAX_JOINTS] {
+    pub(crate) fn read(&mut self, angles_rad: &JointVector) -> [i32; MAX_JOINTS] {
         let mut counts = [0; MAX_JOINTS];
         for k in 0..self.joint_count {
             let noise = if self.noise_counts > 0.0 { self.noise_counts * self.normal() } else { 0.0 };

@@ -13,15 +13,15 @@
 //! estimator. Everything is deterministic: the same scene and seed give the same bytes.
 
 pub mod controller;
-mod encoders;
+pub(crate) mod encoders;
 pub mod injection;
+pub(crate) mod motors;
 pub mod observe;
 #[cfg(feature = "command")]
 pub mod recorder;
 pub mod summary;
 
 use crate::MAX_JOINTS;
-use crate::plant::dynamics::JointVector;
 use crate::plant::{Lost, ModelError, Motion, ObjectModel, Plant, PlantModel};
 use crate::record::sample::Sample;
 use crate::scene::Scene;
@@ -33,6 +33,7 @@ use blindgrasp_shared::tick::Sensed;
 use controller::{Alone, Controller, Reach, Stepped, Turn};
 use encoders::Encoders;
 use injection::{Injection, Injections, Sensing};
+use motors::Motors;
 use nalgebra::Vector3;
 use observe::{Observer, Seen};
 use std::time::Instant;
@@ -66,8 +67,7 @@ pub struct Simulation<C = Alone> {
     joint_names: Vec<String>,
     ticks: u64,
     period_us: u64,
-    substeps: usize,
-    torque_limits_nm: JointVector,
+    motors: Motors,
     delayed: bool,
     /// The force `f_d` when all of it acts, N.
     force_n: f32,
@@ -106,21 +106,13 @@ impl<C: Controller> Simulation<C> {
     /// # Errors
     /// What is wrong with the scene's model or its gains.
     pub fn with_controller(scene: &Scene, controller: C) -> Result<Self, SimulationError> {
-        let mut angles_rad = [0.0; MAX_JOINTS];
-        angles_rad[..scene.start.angles_rad.len()].copy_from_slice(&scene.start.angles_rad);
-        let start = Motion::at_rest(angles_rad, scene.start.position_m, scene.start.attitude);
-        let plant = Plant::new(model(scene), start, scene.plant.substep_s)?;
-        let mut torque_limits_nm = [f64::INFINITY; MAX_JOINTS];
-        for (limit, joint) in torque_limits_nm.iter_mut().zip(&scene.joints) {
-            *limit = joint.torque_limit_nm;
-        }
+        let plant = plant(scene)?;
         Ok(Self {
             name: scene.name.clone(),
             joint_names: scene.joints.iter().map(|joint| joint.name.clone()).collect(),
             ticks: (scene.duration_s / scene.control.period_s).round() as u64,
             period_us: (scene.control.period_s * 1e6).round() as u64,
-            substeps: scene.substeps,
-            torque_limits_nm,
+            motors: Motors::new(scene),
             delayed: scene.actuators.output_delay_ticks > 0,
             force_n: scene.controller_config().law.force_n,
             ideal: scene.sensors.ideal,
@@ -167,7 +159,6 @@ impl<C: Controller> Simulation<C> {
         let begun = Instant::now();
         let mut samples = Vec::with_capacity(self.ticks as usize + 1);
         let mut first_fault = None;
-        let mut applied = None;
         let mut lost = None;
         for tick in 0..=self.ticks {
             let t_s = self.time_s(tick);
@@ -180,7 +171,7 @@ impl<C: Controller> Simulation<C> {
             watch(&self.controller);
             first_fault = first_fault.or(stepped.fault.map(|raised| (tick, raised)));
             let wanted_nm = if self.delayed { computed_before } else { stepped.torques_nm };
-            if let Err(reason) = self.move_on(t_s, &wanted_nm, &stepped, &mut applied, &mut samples) {
+            if let Err(reason) = self.move_on(t_s, &wanted_nm, &stepped, &mut samples) {
                 lost = Some(reason);
                 break;
             }
@@ -223,51 +214,46 @@ impl<C: Controller> Simulation<C> {
         self.controller.step(&Turn { sensed, late: sensing.late, command, reach: sensing.reach })
     }
 
-    /// What the torques do in one control period that begins at `t_s`. `applied` are the torques on the joints, before (if
-    /// there was a before) and after.
+    /// What the torques do in one control period that begins at `t_s`.
     fn move_on(
         &mut self,
         t_s: f64,
         wanted_nm: &[f32; MAX_JOINTS],
         stepped: &Stepped,
-        applied: &mut Option<JointVector>,
         samples: &mut Vec<Sample>,
     ) -> Result<(), (f64, Lost)> {
-        // 3: actuate.
-        let now: JointVector = std::array::from_fn(|k| {
-            f64::from(wanted_nm[k]).clamp(-self.torque_limits_nm[k], self.torque_limits_nm[k])
-        });
-        let before = applied.replace(now).unwrap_or(now);
-        // 4: plant. The torques change at the very instant of the first sub-step, whose kick covers half a sub-step on
-        // either side: it gets their mean, which keeps the integrator's second order.
-        let mut torques: JointVector = std::array::from_fn(|k| 0.5 * (before[k] + now[k]));
-        for substep in 0..self.substeps {
-            let at_s = t_s + (self.period_us * substep as u64) as f64 / (1e6 * self.substeps as f64);
-            self.plant.solve(&torques).map_err(|lost| (at_s, lost))?;
-            if substep == 0 {
-                // 5: record.
-                samples.push(self.sample(t_s, &now, stepped));
-                torques = now;
-            }
-            self.plant.advance();
-        }
-        Ok(())
-    }
-
-    fn sample(&self, t_s: f64, applied: &JointVector, stepped: &Stepped) -> Sample {
         let joints = self.joint_names.len();
         let (angles_rad, speeds_rad_s) =
             (stepped.angles_rad.map(f64::from), stepped.speeds_rad_s.map(f64::from));
         let force_share = if self.force_n > 0.0 { f64::from(stepped.force_n / self.force_n) } else { 0.0 };
-        let seen = Seen {
-            angles_rad: &angles_rad[..joints],
-            speeds_rad_s: &speeds_rad_s[..joints],
-            torques_nm: &applied[..joints],
-            force_share,
-            mode: stepped.mode.words(),
-        };
-        self.observer.sample(t_s, &self.plant, &seen)
+        let observer = &self.observer;
+        // 3, 4: actuate, plant; 5: record.
+        let moved = self.motors.turn(&mut self.plant, wanted_nm, |plant, applied_nm| {
+            let seen = Seen {
+                angles_rad: &angles_rad[..joints],
+                speeds_rad_s: &speeds_rad_s[..joints],
+                torques_nm: &applied_nm[..joints],
+                force_share,
+                mode: stepped.mode.words(),
+            };
+            samples.push(observer.sample(t_s, plant, &seen));
+        });
+        moved.map_err(|(substep, lost)| {
+            let at_s = (self.period_us * substep as u64) as f64 / (1e6 * self.motors.substeps as f64);
+            (t_s + at_s, lost)
+        })
     }
+}
+
+/// The plant of a scene, as everything is at the start.
+///
+/// # Errors
+/// A model that has no equations of motion.
+pub fn plant(scene: &Scene) -> Result<Plant, ModelError> {
+    let mut angles_rad = [0.0; MAX_JOINTS];
+    angles_rad[..scene.start.angles_rad.len()].copy_from_slice(&scene.start.angles_rad);
+    let start = Motion::at_rest(angles_rad, scene.start.position_m, scene.start.attitude);
+    Plant::new(model(scene), start, scene.plant.substep_s)
 }
 
 /// The grasp law of a scene in the precision of the plant.

@@ -1,0 +1,476 @@
+//! `blindgrasp record`: everything that one or more hands say, into one file.
+
+use super::{Outcome, ports};
+use anyhow::{Context, anyhow, bail};
+use blindgrasp::device::client::Request;
+use blindgrasp::device::interrupt;
+use blindgrasp::device::recorder::{Recorder, Recording, Totals};
+use blindgrasp::device::talk::{self, Event, Talk, TalkError};
+use blindgrasp::device::transport::{Transport, TransportError};
+use blindgrasp::record::mcap::{RecordingError, Saved};
+use blindgrasp_shared::link::message::Signals;
+use clap::Args;
+use indicatif::{ProgressBar, ProgressStyle};
+use serde::Serialize;
+use std::collections::BTreeSet;
+use std::fmt::Write as _;
+use std::fs;
+use std::io::{self, Write as _};
+use std::path::PathBuf;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{self, Receiver, RecvTimeoutError, Sender};
+use std::thread;
+use std::time::{Duration, Instant};
+
+/// How long nothing is looked at but the line.
+const SLICE: Duration = Duration::from_millis(10);
+/// How long a line may take no bytes.
+const SENDING: Duration = Duration::from_secs(1);
+/// From one look for a port that is lost to the next.
+const LOOK_AGAIN: Duration = Duration::from_millis(500);
+
+/// Record everything that hands say, every tick of it, into an MCAP file
+///
+/// One hand at each port, all on one clock, in one file, which Foxglove, PlotJuggler, Rerun and Python open, and `replay` and
+/// `export` take. It is whole at every moment. A port that is unplugged is waited for, and the gap is in the file. Ctrl-C, or
+/// --duration, ends the recording.
+///
+/// It only listens: a hand is commanded by `console --out FILE` or `monitor --out FILE`, which record in the same way. The
+/// heartbeat is kept while it records; a hand with torque lets go when it ends.
+///
+/// Exit code 0: no record was lost; 1: some were, which the file tells, or the disk is full; the file is good all the same;
+/// 2: bad usage, or nobody answers.
+#[derive(Args)]
+pub(crate) struct Arguments {
+    /// A serial port (/dev/ttyUSB0, COM3), or unix:PATH for a socket at which somebody listens; may be repeated
+    #[arg(long = "port", value_name = "PORT")]
+    ports: Vec<String>,
+    /// The file to write
+    #[arg(long, value_name = "FILE.mcap")]
+    out: PathBuf,
+    /// How long, s [default: until Ctrl-C]
+    #[arg(long, value_name = "S", value_parser = seconds)]
+    duration: Option<f64>,
+    /// A hand's file, if it is not built in: for angles and the joints' names; may be repeated
+    #[arg(long = "hand", value_name = "HAND")]
+    hands: Vec<String>,
+    /// Record one in so many ticks
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..))]
+    decimation: u16,
+    /// Overwrite the file
+    #[arg(long)]
+    force: bool,
+    /// Print the summary as one JSON object
+    #[arg(long)]
+    json: bool,
+}
+
+/// A time that can be waited for.
+fn seconds(text: &str) -> Result<f64, String> {
+    let seconds = text.parse().ok().filter(|seconds| (0.001..=1e7).contains(seconds));
+    seconds.ok_or("seconds from 0.001 to 10000000 are wanted".to_owned())
+}
+
+/// What `--json` prints.
+#[derive(Serialize)]
+struct Report {
+    file: String,
+    bytes: u64,
+    seconds_s: f64,
+    records: u64,
+    /// Whether every record that was asked for is there.
+    whole: bool,
+    devices: Vec<Device>,
+    /// What ended the recording, if that was not the user.
+    error: Option<String>,
+}
+
+#[derive(Serialize)]
+struct Device {
+    name: String,
+    port: String,
+    sessions: u64,
+    records: u64,
+    /// Records that are missing; of these, or of the answers, the device itself dropped some, ...
+    missing: u64,
+    dropped_by_device: u64,
+    /// ... and the others were lost on the way.
+    lost_on_the_way: u64,
+    frames_unusable: u64,
+    frames_damaged: u64,
+    gaps: u64,
+    gaps_s: f64,
+    decimation: u32,
+}
+
+/// What a thread tells.
+enum News {
+    /// A line for the user.
+    Words(usize, String),
+    /// What became of the link in the last second.
+    Status(usize, Totals),
+    /// It has ended.
+    End(usize, Ended),
+}
+
+/// How the recording of a port ended.
+struct Ended {
+    totals: Totals,
+    gaps: Duration,
+    error: Option<Trouble>,
+}
+
+/// What ends a recording early.
+enum Trouble {
+    /// Nobody is there, or nobody that can be talked to.
+    Nobody(anyhow::Error),
+    /// The file takes nothing any more.
+    File(RecordingError),
+}
+
+/// Runs the command.
+pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
+    let Arguments { ports, out, .. } = arguments;
+    if ports.is_empty() {
+        ports::given(None)?;
+    }
+    if ports.iter().collect::<BTreeSet<_>>().len() < ports.len() {
+        bail!("--port: one is named twice");
+    }
+    if let Some(unknown) =
+        arguments.hands.iter().find_map(|hand| blindgrasp::scene::HandModel::load(hand).err())
+    {
+        return Err(unknown.into());
+    }
+    interrupt::listen();
+    let lines = ports.iter().map(|port| talk::open(port)).collect::<Result<Vec<_>, _>>()?;
+    let recording = Recording::create(out, arguments.force)?;
+    let bar = ProgressBar::new_spinner();
+    // What is said to a terminal that is none goes nowhere.
+    let style = ProgressStyle::with_template("{spinner} {msg}").context("the progress line")?;
+    bar.set_style(style);
+    bar.enable_steady_tick(Duration::from_millis(250));
+
+    let begun = Instant::now();
+    let until = arguments.duration.map(|seconds| begun + Duration::from_secs_f64(seconds));
+    let ending = AtomicBool::new(false);
+    let (tell, news) = mpsc::channel();
+    let ended = thread::scope(|scope| {
+        for (k, (port, line)) in ports.iter().zip(lines).enumerate() {
+            let recorder = recording.add(&name(k, ports.len()), port, &arguments.hands, arguments.decimation);
+            let attendant = Attendant {
+                k,
+                port,
+                recorder,
+                tell: tell.clone(),
+                ending: &ending,
+                until,
+                gaps: Duration::ZERO,
+            };
+            scope.spawn(move || attendant.run(line));
+        }
+        drop(tell);
+        follow(&news, &bar, &recording, ports, begun, &ending)
+    });
+    bar.finish_and_clear();
+    let finished = recording.finish();
+    finish(arguments, ended, finished)
+}
+
+/// Name of a device in the recording.
+fn name(k: usize, count: usize) -> String {
+    if count == 1 { "hand".to_owned() } else { format!("hand{}", k + 1) }
+}
+
+/// Tells the user what the threads tell, until they have ended.
+fn follow(
+    news: &Receiver<News>,
+    bar: &ProgressBar,
+    recording: &Recording,
+    ports: &[String],
+    begun: Instant,
+    ending: &AtomicBool,
+) -> Vec<Ended> {
+    let mut totals = vec![Totals::default(); ports.len()];
+    let mut ended: Vec<Option<Ended>> = ports.iter().map(|_| None).collect();
+    loop {
+        match news.recv_timeout(Duration::from_millis(250)) {
+            Ok(News::Words(k, words)) => bar.suspend(|| eprintln!("blindgrasp: {}: {words}", ports[k])),
+            Ok(News::Status(k, status)) => totals[k] = status,
+            Ok(News::End(k, end)) => {
+                if end.error.is_some() {
+                    ending.store(true, Ordering::Relaxed);
+                }
+                totals[k] = end.totals;
+                ended[k] = Some(end);
+            }
+            Err(RecvTimeoutError::Timeout) => {}
+            Err(RecvTimeoutError::Disconnected) => return ended.into_iter().flatten().collect(),
+        }
+        let saved = recording.saved();
+        let lost: u64 = totals.iter().map(|totals| totals.missing).sum();
+        let elapsed_s = begun.elapsed().as_secs_f64();
+        bar.set_message(format!(
+            "{elapsed_s:.0} s, {} records, {lost} lost, {:.0} a second, {:.1} MB",
+            saved.records,
+            saved.records as f64 / elapsed_s.max(1e-3),
+            saved.bytes as f64 / 1e6
+        ));
+    }
+}
+
+/// Says what became of it all.
+fn finish(
+    arguments: &Arguments,
+    ended: Vec<Ended>,
+    finished: Result<Saved, RecordingError>,
+) -> anyhow::Result<Outcome> {
+    let Arguments { ports, out, json, .. } = arguments;
+    let mut error = finished.as_ref().err().map(ToString::to_string);
+    let saved = finished.unwrap_or_default();
+    let mut devices = Vec::new();
+    for (k, Ended { totals, gaps, error: trouble }) in ended.into_iter().enumerate() {
+        match trouble {
+            Some(Trouble::Nobody(error)) => {
+                if saved.records == 0 {
+                    // Nothing is lost with it, and the next attempt needs no --force.
+                    let _ = fs::remove_file(out);
+                }
+                return Err(error.context(format!("port {}", ports[k])));
+            }
+            Some(Trouble::File(stopped)) => error = Some(stopped.to_string()),
+            None => {}
+        }
+        devices.push(Device {
+            name: name(k, ports.len()),
+            port: ports[k].clone(),
+            sessions: totals.sessions,
+            records: totals.records,
+            missing: totals.missing,
+            dropped_by_device: totals.dropped,
+            lost_on_the_way: totals.missing.saturating_sub(totals.dropped),
+            frames_unusable: totals.unusable,
+            frames_damaged: totals.damaged,
+            gaps: totals.gaps,
+            gaps_s: gaps.as_secs_f64(),
+            decimation: totals.decimation,
+        });
+    }
+    let whole = devices.iter().all(|device| {
+        device.missing == 0 && device.dropped_by_device == 0 && device.gaps == 0 && device.sessions > 0
+    });
+    let report = Report {
+        file: out.display().to_string(),
+        bytes: saved.bytes,
+        seconds_s: saved.seconds,
+        records: saved.records,
+        whole,
+        devices,
+        error,
+    };
+    let text = if *json { serde_json::to_string(&report)? + "\n" } else { describe(&report) };
+    io::stdout().lock().write_all(text.as_bytes()).context("cannot print the summary")?;
+    if let Some(error) = &report.error {
+        eprintln!("blindgrasp: {error}");
+    }
+    Ok(if whole && report.error.is_none() { Outcome::Shown } else { Outcome::Failed })
+}
+
+/// The summary as a table.
+fn describe(report: &Report) -> String {
+    let mut text = String::new();
+    let mut line = |name: &str, value: String| {
+        let _ = writeln!(text, "{name:<22}{value}");
+    };
+    line("file", format!("{}, {} bytes", report.file, report.bytes));
+    line("recorded", format!("{:.3} s, {} records", report.seconds_s, report.records));
+    for device in &report.devices {
+        let Device { name, records, missing, dropped_by_device, lost_on_the_way, .. } = device;
+        let lost = match (missing, dropped_by_device) {
+            (0, 0) => "none lost".to_owned(),
+            _ => format!(
+                "{missing} LOST: {lost_on_the_way} on the way; {dropped_by_device} records and answers dropped by the device"
+            ),
+        };
+        line(name, format!("{records} records, {lost}"));
+        if device.decimation > 1 {
+            line("", format!("one in up to {} ticks was sent", device.decimation));
+        }
+        if device.frames_damaged + device.frames_unusable > 0 {
+            let (damaged, unusable) = (device.frames_damaged, device.frames_unusable);
+            line("", format!("{damaged} frames damaged, {unusable} whole but not to be decoded"));
+        }
+        if device.gaps > 0 {
+            line("", format!("{} gaps, {:.3} s", device.gaps, device.gaps_s));
+        }
+    }
+    if !report.whole {
+        line("", "the file is good; it tells what is missing, and where".to_owned());
+    }
+    text
+}
+
+/// Looks after one port.
+struct Attendant<'a> {
+    k: usize,
+    port: &'a str,
+    recorder: Recorder,
+    tell: Sender<News>,
+    /// Somebody else has an error.
+    ending: &'a AtomicBool,
+    until: Option<Instant>,
+    /// Time without a session, after the first.
+    gaps: Duration,
+}
+
+/// Why a talk ended.
+enum Cut {
+    /// That is the end.
+    End,
+    /// Nothing comes over the line.
+    Line(anyhow::Error),
+    File(RecordingError),
+}
+
+impl From<RecordingError> for Cut {
+    fn from(error: RecordingError) -> Self {
+        Self::File(error)
+    }
+}
+
+impl From<TalkError> for Cut {
+    fn from(error: TalkError) -> Self {
+        Self::Line(ports::explained(error))
+    }
+}
+
+impl From<TransportError> for Cut {
+    fn from(error: TransportError) -> Self {
+        match error {
+            TransportError::Interrupted => Self::End,
+            error => Self::Line(anyhow!(error)),
+        }
+    }
+}
+
+impl Attendant<'_> {
+    fn run(mut self, line: Box<dyn Transport + Send>) {
+        let error = self.attend(line).err();
+        let error = error.or_else(|| self.recorder.finish(Instant::now()).err().map(Trouble::File));
+        let end = Ended { totals: *self.recorder.totals(), gaps: self.gaps, error };
+        let _ = self.tell.send(News::End(self.k, end));
+    }
+
+    /// From one connexion to the next.
+    fn attend(&mut self, line: Box<dyn Transport + Send>) -> Result<(), Trouble> {
+        let mut line = Some(line);
+        let mut cut_at = None;
+        let mut told = String::new();
+        while !self.is_over(Instant::now()) {
+            let Some(open) = &mut line else {
+                thread::sleep(LOOK_AGAIN);
+                line = talk::open(self.port).ok();
+                continue;
+            };
+            match self.listen(&mut **open, &mut cut_at) {
+                Cut::End => break,
+                Cut::File(error) => return Err(Trouble::File(error)),
+                Cut::Line(error) if self.recorder.totals().sessions == 0 => {
+                    return Err(Trouble::Nobody(error));
+                }
+                Cut::Line(error) => {
+                    line = None;
+                    let now = Instant::now();
+                    let since = *cut_at.get_or_insert(now);
+                    let words = format!("{error:#}");
+                    self.recorder.cut(&words, now).map_err(Trouble::File)?;
+                    // Once, not twice a second.
+                    if since == now || words != told {
+                        self.say(format!("{words}; waiting for it to come back"));
+                    }
+                    told = words;
+                }
+            }
+        }
+        if let Some(since) = cut_at {
+            self.gaps += since.elapsed();
+        }
+        Ok(())
+    }
+
+    /// Until the line is cut.
+    fn listen(&mut self, line: &mut dyn Transport, cut_at: &mut Option<Instant>) -> Cut {
+        let mut talk = Talk::new(talk::PATIENCE, Instant::now()).tapped();
+        let cut = loop {
+            if let Err(cut) = self.turn(&mut talk, line, cut_at) {
+                break cut;
+            }
+        };
+        if let Cut::End = cut {
+            // Nobody listens any more.
+            let now = Instant::now();
+            talk.ask(Request::Telemetry { decimation: 0, signals: Signals::NONE }, now);
+            let _ = line.send(&talk.outgoing(), now + SENDING);
+        }
+        cut
+    }
+
+    /// What there is to do, and to wait for, at one time.
+    fn turn(
+        &mut self,
+        talk: &mut Talk,
+        line: &mut dyn Transport,
+        cut_at: &mut Option<Instant>,
+    ) -> Result<(), Cut> {
+        let now = Instant::now();
+        if self.is_over(now) {
+            return Err(Cut::End);
+        }
+        talk.turn(now)?;
+        while let Some(event) = talk.event() {
+            self.recorder.take(&event, talk, now)?;
+            self.hear(&event, cut_at, now);
+        }
+        if self.recorder.turn(talk, now)?.is_some() {
+            let _ = self.tell.send(News::Status(self.k, *self.recorder.totals()));
+        }
+        line.send(&talk.outgoing(), now + SENDING)?;
+        let deadline = talk.due().clamp(now + Duration::from_millis(1), now + SLICE);
+        let mut buffer = [0; 4096];
+        match line.receive(&mut buffer, deadline) {
+            Ok(count) => Ok(talk.take(&buffer[..count], Instant::now())?),
+            Err(TransportError::TimedOut) => Ok(()),
+            Err(error) => Err(error.into()),
+        }
+    }
+
+    /// Tells the user what matters to him.
+    fn hear(&mut self, event: &Event, cut_at: &mut Option<Instant>, now: Instant) {
+        match event {
+            Event::Open { firmware, .. } => match cut_at.take() {
+                Some(since) => {
+                    self.gaps += now - since;
+                    self.say(format!("back after {:.1} s: {}", (now - since).as_secs_f64(), firmware.words));
+                }
+                None => self.say(firmware.words.clone()),
+            },
+            Event::StartedAnew => {
+                *cut_at = Some(now);
+                self.say("the device was reset".to_owned());
+            }
+            Event::Fault(Some(raised)) => self.say(raised.to_string()),
+            _ => {}
+        }
+    }
+
+    fn say(&self, words: String) {
+        // Who does not listen has ended.
+        let _ = self.tell.send(News::Words(self.k, words));
+    }
+
+    fn is_over(&self, now: Instant) -> bool {
+        interrupt::wanted()
+            || self.ending.load(Ordering::Relaxed)
+            || self.until.is_some_and(|until| until <= now)
+    }
+}

@@ -1,0 +1,164 @@
+//! What is between the tick and the line in the firmware (`firmware/src/queue.rs`, `link.rs`), for a hand that is simulated:
+//! the same queues with the same room, in the same order, and a line of the same speed. So what a real line has no time for
+//! is dropped here, too, and counted in the same place.
+
+use super::client::{Packet, Record};
+use crate::MAX_JOINTS;
+use blindgrasp_shared::command::{Command, Refusal};
+use blindgrasp_shared::device::Outputs;
+use blindgrasp_shared::link::message::{self, Request, Signals, not_understood};
+use blindgrasp_shared::link::{Receiver, Sender, most_bytes};
+use blindgrasp_shared::telemetry::snapshot::Part;
+use std::collections::VecDeque;
+use std::time::Duration;
+
+type Reply = message::Reply<'static, MAX_JOINTS>;
+
+/// Room of the firmware's queues.
+const STOPS: usize = 1;
+const PACKETS: usize = 7;
+const ANSWERS: usize = 7;
+const RECORDS: usize = 7;
+const REFUSALS: usize = 64;
+/// Bits of a byte on the line: one to start, one to stop.
+const BITS: f64 = 10.0;
+
+/// What the hand tells by itself.
+enum Telemetry {
+    Record(Box<Record>, Signals),
+    Part(Part),
+}
+
+/// The firmware's end of a line.
+pub struct Line {
+    receiver: Receiver<{ Packet::MOST_BYTES + 4 }>,
+    stops: VecDeque<Packet>,
+    packets: VecDeque<Packet>,
+    /// Requests that do not get to the tick.
+    refusals: VecDeque<Reply>,
+    answers: VecDeque<Reply>,
+    records: VecDeque<Telemetry>,
+    sender: Sender<MAX_JOINTS>,
+    dropped: u32,
+    /// Bytes in a second; infinite if the line is as fast as one likes.
+    bytes_per_s: f64,
+    /// Bytes that the line has had time for, and was not given yet.
+    credit_bytes: f64,
+    /// What is being sent, and how much of it was.
+    frame: Vec<u8>,
+    sent: usize,
+}
+
+impl Line {
+    /// A line of so many baud; 0 if it is as fast as one likes.
+    pub fn new(baud: u32) -> Self {
+        Self {
+            receiver: Receiver::new(),
+            stops: VecDeque::new(),
+            packets: VecDeque::new(),
+            refusals: VecDeque::new(),
+            answers: VecDeque::new(),
+            records: VecDeque::new(),
+            sender: Sender::new(),
+            dropped: 0,
+            bytes_per_s: if baud == 0 { f64::INFINITY } else { f64::from(baud) / BITS },
+            credit_bytes: 0.0,
+            frame: Vec::new(),
+            sent: 0,
+        }
+    }
+
+    /// Whether there is room for the refusal of whatever may come. Where not, bytes wait where they are.
+    pub fn listens(&self) -> bool {
+        self.refusals.len() < REFUSALS
+    }
+
+    /// Takes bytes that came.
+    pub fn take(&mut self, bytes: &[u8]) {
+        for &byte in bytes {
+            let Some(Ok(payload)) = self.receiver.push(byte) else { continue };
+            match Packet::decode(payload) {
+                Ok(packet) => self.put(packet),
+                Err(_) => self.refusals.push_back(not_understood(payload)),
+            }
+        }
+    }
+
+    fn put(&mut self, packet: Packet) {
+        let (queue, room) = match packet.request {
+            Request::Command(Command::Stop) => (&mut self.stops, STOPS),
+            _ => (&mut self.packets, PACKETS),
+        };
+        if queue.len() < room {
+            queue.push_back(packet);
+        } else {
+            let Packet { sequence, .. } = packet;
+            self.refusals.push_back(Reply::Answer { sequence, refused: Some(Refusal::Busy) });
+        }
+    }
+
+    /// The request for this tick. A stop overtakes whatever waits.
+    pub fn packet(&mut self) -> Option<Packet> {
+        self.stops.pop_front().or_else(|| self.packets.pop_front())
+    }
+
+    /// Leaves what a tick gave for the line, or drops and counts it.
+    pub fn post(&mut self, outputs: Outputs<MAX_JOINTS>) {
+        if let Some(reply) = outputs.reply {
+            if self.answers.len() < ANSWERS {
+                self.answers.push_back(reply);
+            } else {
+                self.dropped = self.dropped.saturating_add(1);
+            }
+        }
+        let record = outputs.telemetry.map(|signals| Telemetry::Record(Box::new(outputs.record), signals));
+        for telemetry in record.into_iter().chain(outputs.part.map(Telemetry::Part)) {
+            if self.records.len() < RECORDS {
+                self.records.push_back(telemetry);
+            } else {
+                self.dropped = self.dropped.saturating_add(1);
+            }
+        }
+    }
+
+    /// How much was dropped so far.
+    pub fn dropped(&self) -> u32 {
+        self.dropped
+    }
+
+    /// Sends what the line has time for.
+    pub fn send(&mut self, time: Duration, to: &mut Vec<u8>) {
+        self.credit_bytes += self.bytes_per_s * time.as_secs_f64();
+        while self.credit_bytes >= 1.0 {
+            if self.sent == self.frame.len() && !self.load() {
+                // A line that has nothing to send does not save the time up.
+                self.credit_bytes = 0.0;
+                return;
+            }
+            let rest = &self.frame[self.sent..];
+            let count = rest.len().min(self.credit_bytes as usize);
+            to.extend_from_slice(&rest[..count]);
+            self.sent += count;
+            self.credit_bytes -= count as f64;
+        }
+    }
+
+    /// Makes the next frame, if there is something to send: refusals, then answers, then telemetry.
+    fn load(&mut self) -> bool {
+        let mut buffer = [0; most_bytes(Reply::MOST_BYTES)];
+        let sender = &mut self.sender;
+        let frame = match self.refusals.pop_front().or_else(|| self.answers.pop_front()) {
+            Some(reply) => sender.reply(&reply, &mut buffer),
+            None => match self.records.pop_front() {
+                Some(Telemetry::Record(record, signals)) => sender.record(&record, signals, &mut buffer),
+                Some(Telemetry::Part(part)) => sender.reply(&Reply::Snapshot(part), &mut buffer),
+                None => return false,
+            },
+        };
+        // The buffer has room for the longest reply.
+        self.frame.clear();
+        self.frame.extend_from_slice(frame.unwrap_or_default());
+        self.sent = 0;
+        true
+    }
+}

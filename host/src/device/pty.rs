@@ -1,0 +1,128 @@
+//! A pseudo-terminal: what a program opens like a serial port, with this process for its device.
+
+use nix::errno::Errno;
+use nix::fcntl::{FcntlArg, OFlag, fcntl};
+use nix::pty::openpty;
+use nix::sys::termios::{SetArg, cfmakeraw, tcgetattr, tcsetattr};
+use nix::unistd::ttyname;
+use std::fs::{self, File};
+use std::io::{self, ErrorKind, Read as _, Write as _};
+use std::os::unix::fs::symlink;
+use std::path::{Path, PathBuf};
+
+/// The device's end.
+pub struct Pty {
+    end: File,
+    port: PathBuf,
+    /// Whether a program has opened the port, as far as is known.
+    attended: bool,
+    lost_bytes: u64,
+}
+
+impl Pty {
+    /// Opens one that carries bytes as they are.
+    ///
+    /// # Errors
+    /// If the operating system has none.
+    pub fn open() -> io::Result<Self> {
+        let pair = openpty(None, None)?;
+        let mut settings = tcgetattr(&pair.slave)?;
+        cfmakeraw(&mut settings);
+        tcsetattr(&pair.slave, SetArg::TCSANOW, &settings)?;
+        fcntl(&pair.master, FcntlArg::F_SETFL(OFlag::O_NONBLOCK))?;
+        let port = ttyname(&pair.slave)?;
+        // Only programs hold the other end, so that it is known whether one does.
+        Ok(Self { end: File::from(pair.master), port, attended: false, lost_bytes: 0 })
+    }
+
+    /// What a program opens.
+    pub fn port(&self) -> &Path {
+        &self.port
+    }
+
+    /// What came; nothing if nobody is there.
+    ///
+    /// # Errors
+    /// If the operating system refuses.
+    pub fn receive(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        let received = self.end.read(buffer);
+        self.attended = !received.as_ref().is_err_and(is_nobody);
+        match received {
+            Err(error) if is_nobody(&error) || is_nothing(&error) => Ok(0),
+            other => other,
+        }
+    }
+
+    /// Sends bytes, if anybody was there when it was last looked whether something came. Nobody waits for a program that
+    /// does not read: what it has no room for is lost, as on a wire.
+    ///
+    /// # Errors
+    /// If the operating system refuses.
+    pub fn send(&mut self, bytes: &[u8]) -> io::Result<()> {
+        if !self.attended {
+            // They must not wait for the next program.
+            return Ok(());
+        }
+        let sent = match self.end.write(bytes) {
+            Ok(sent) => sent,
+            Err(error) if is_nobody(&error) => return Ok(()),
+            Err(error) if is_nothing(&error) => 0,
+            Err(error) => return Err(error),
+        };
+        self.lost_bytes += (bytes.len() - sent) as u64;
+        Ok(())
+    }
+
+    /// How many bytes were lost because a program did not read.
+    pub fn lost_bytes(&self) -> u64 {
+        self.lost_bytes
+    }
+}
+
+/// Whether no program has opened the port.
+fn is_nobody(error: &io::Error) -> bool {
+    error.raw_os_error() == Some(Errno::EIO as i32)
+}
+
+/// Whether there is nothing now.
+fn is_nothing(error: &io::Error) -> bool {
+    matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::Interrupted)
+}
+
+/// A symbolic link to a port, as long as it lives.
+pub struct Link {
+    path: PathBuf,
+    port: PathBuf,
+}
+
+impl Link {
+    /// Makes it, in place of another symbolic link.
+    ///
+    /// # Errors
+    /// If something else is there, or it can't be made.
+    pub fn new(path: &Path, port: &Path) -> io::Result<Self> {
+        if fs::symlink_metadata(path).is_ok_and(|found| !found.is_symlink()) {
+            return Err(io::Error::new(
+                ErrorKind::AlreadyExists,
+                "there is a file, which is no symbolic link",
+            ));
+        }
+        // Renamed, so that there is always one or the other.
+        let mut aside = path.as_os_str().to_owned();
+        aside.push(format!(".{}", std::process::id()));
+        symlink(port, &aside)?;
+        fs::rename(&aside, path).inspect_err(|_| {
+            let _ = fs::remove_file(&aside);
+        })?;
+        Ok(Self { path: path.to_owned(), port: port.to_owned() })
+    }
+}
+
+impl Drop for Link {
+    fn drop(&mut self) {
+        // Somebody else may have put another in its place.
+        if fs::read_link(&self.path).is_ok_and(|port| port == self.port) {
+            let _ = fs::remove_file(&self.path);
+        }
+    }
+}

@@ -1,0 +1,454 @@
+//! What goes over a line, into a recording: every payload as it is, and between them who the device is and what its
+//! parameters are.
+//!
+//! A [`Recorder`] stands beside a tapped talk and takes its events. In each session it asks, aside, for all parameters and
+//! then for every tick's record and for snapshots of the state; after a parameter was set, for these again, so that a replay
+//! has a state to go on from. What was caught around a fault is read slowly, in the time that the records leave on the line.
+
+use super::client::{Answer, Firmware, Request};
+use super::talk::{Event, Talk};
+use super::transport::BAUD;
+use crate::MAX_JOINTS;
+use crate::record::mcap::{About, Device, Level, LinkStatus, RecordingError, Saved, Setting, Stamp, Writer};
+use crate::scene::{HandFile, HandModel};
+use blindgrasp_shared::command::Refusal;
+use blindgrasp_shared::link::message::{Reply, Signals};
+use blindgrasp_shared::settings::{Each, Parameter};
+use std::path::Path;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::{Duration, Instant};
+
+/// From one status of the link to the next.
+const STATUS: Duration = Duration::from_secs(1);
+/// From one record of a burst to the next: 150 bytes, where the records of 20 ms leave 400 on the line.
+const BURST: Duration = Duration::from_millis(20);
+/// How long a parameter waits for others that are set together with it.
+const SETTLED: Duration = Duration::from_millis(50);
+/// How often something is asked that was not answered.
+const TRIES: u8 = 3;
+/// Payloads that were sent before a session, and are kept for it.
+const KEPT: usize = 8;
+
+/// A recording that several devices may share.
+#[derive(Clone)]
+pub struct Recording {
+    writer: Arc<Mutex<Option<Writer>>>,
+    /// The host's clock, which does not jump.
+    begun: (Instant, Stamp),
+}
+
+impl Recording {
+    /// Begins a file.
+    ///
+    /// # Errors
+    /// If it is there already, and not to be overwritten by `force`, or can't be made.
+    pub fn create(path: &Path, force: bool) -> Result<Self, RecordingError> {
+        let writer = Arc::new(Mutex::new(Some(Writer::create(path, force)?)));
+        Ok(Self { writer, begun: (Instant::now(), Stamp::now()) })
+    }
+
+    /// Adds a device, with whom nobody has spoken yet. `hands` are files that its hand may be found in.
+    pub fn add(&self, name: &str, port: &str, hands: &[String], decimation: u16) -> Recorder {
+        let device = self.lock().as_mut().map(|writer| writer.add_device(name));
+        Recorder {
+            recording: self.clone(),
+            device,
+            port: port.to_owned(),
+            hands: hands.to_vec(),
+            decimation,
+            kept: Vec::new(),
+            identity: Vec::new(),
+            phase: Phase::Nobody,
+            asked: 0,
+            settings: Vec::new(),
+            changed: None,
+            burst: None,
+            status_due: None,
+            totals: Totals::default(),
+        }
+    }
+
+    /// What is in the file; nothing once it is finished.
+    pub fn saved(&self) -> Saved {
+        self.lock().as_ref().map_or(Saved::default(), Writer::saved)
+    }
+
+    /// Ends the file. Recorders can add nothing any more.
+    ///
+    /// # Errors
+    /// If that can't be written.
+    pub fn finish(&self) -> Result<Saved, RecordingError> {
+        let writer = self.lock().take();
+        writer.map_or(Ok(Saved::default()), Writer::finish)
+    }
+
+    fn lock(&self) -> MutexGuard<'_, Option<Writer>> {
+        self.writer.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn stamp(&self, now: Instant) -> Stamp {
+        let (begun, stamp) = self.begun;
+        Stamp(stamp.0 + now.saturating_duration_since(begun).as_nanos() as u64)
+    }
+}
+
+/// What became of a device's records.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Totals {
+    /// Sessions.
+    pub sessions: u64,
+    /// Records that came and could be decoded.
+    pub records: u64,
+    /// Records that are missing, by the numbers of those that came.
+    pub missing: u64,
+    /// Records and answers that the device dropped because a queue was full.
+    pub dropped: u64,
+    /// Whole frames that can't be decoded.
+    pub unusable: u64,
+    /// Damaged frames.
+    pub damaged: u64,
+    /// Times that the link was cut.
+    pub gaps: u64,
+    /// Largest number of ticks from one record to the next.
+    pub decimation: u32,
+}
+
+impl Totals {
+    /// Whether every record that was asked for is there.
+    pub fn is_whole(&self) -> bool {
+        self.missing == 0 && self.dropped == 0 && self.gaps == 0
+    }
+
+    fn add(&mut self, status: &LinkStatus) {
+        self.records += status.records;
+        self.missing += status.missing;
+        self.dropped += status.dropped;
+        self.unusable += status.unusable;
+        self.damaged += status.damaged;
+        self.decimation = self.decimation.max(status.decimation);
+    }
+}
+
+/// How far it has come with a device.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Phase {
+    /// No session.
+    Nobody,
+    /// Parameters are asked for; so many answers are still to come.
+    Parameters(usize),
+    /// Records are asked for.
+    Telemetry,
+    /// They come.
+    Records,
+}
+
+/// A burst that is read.
+struct Burst {
+    next: u16,
+    count: Option<u16>,
+    due: Instant,
+    tries: u8,
+    asked: bool,
+}
+
+/// Writes down what goes over the line to one device.
+pub struct Recorder {
+    recording: Recording,
+    device: Option<Device>,
+    port: String,
+    hands: Vec<String>,
+    decimation: u16,
+    /// Payloads that were sent before the session.
+    kept: Vec<Vec<u8>>,
+    /// Payload of the last introduction.
+    identity: Vec<u8>,
+    phase: Phase,
+    /// How often parameters or records were asked for in vain.
+    asked: u8,
+    settings: Vec<Setting>,
+    /// When the parameters that were set are written down.
+    changed: Option<Instant>,
+    burst: Option<Burst>,
+    status_due: Option<Instant>,
+    totals: Totals,
+}
+
+impl Recorder {
+    /// Whether everything that is done from now on is recorded.
+    pub fn is_ready(&self) -> bool {
+        self.phase == Phase::Records
+    }
+
+    /// What became of the records so far, to the last second.
+    pub fn totals(&self) -> &Totals {
+        &self.totals
+    }
+
+    /// Ticks from one record to the next that are asked for: whoever asks the device for records asks for these.
+    pub fn telemetry(&self) -> Request {
+        Request::Telemetry { decimation: self.decimation, signals: Signals::FULL }
+    }
+
+    /// Takes an event of the talk, and asks it for what it needs.
+    ///
+    /// # Errors
+    /// The recording has stopped.
+    pub fn take(&mut self, event: &Event, talk: &mut Talk, now: Instant) -> Result<(), RecordingError> {
+        match event {
+            Event::Received(payload) if is_identity(payload) => payload.clone_into(&mut self.identity),
+            Event::Received(payload) if self.phase != Phase::Nobody => {
+                self.write(now, |writer, device, at| writer.received(device, at, payload).map(|_| ()))?;
+            }
+            Event::Sent(payload) if self.phase != Phase::Nobody => {
+                self.write(now, |writer, device, at| writer.sent(device, at, payload))?;
+            }
+            Event::Sent(payload) => {
+                self.kept.truncate(KEPT - 1);
+                self.kept.insert(0, payload.clone());
+            }
+            Event::Damaged => self.write(now, |writer, device, _| {
+                writer.damaged(device, 1);
+                Ok(())
+            })?,
+            Event::Open { firmware, .. } => self.open(firmware, talk, now)?,
+            Event::StartedAnew => self.cut("the device was reset", now)?,
+            Event::Aside(request, answer) => self.answered(request, answer.as_ref(), talk, now)?,
+            Event::Answer(Request::SetParameter { parameter, index, value }, Answer::Done) => {
+                self.set(*parameter, *index, Some(*value));
+                self.changed = Some(now + SETTLED);
+            }
+            Event::Unanswered(Request::SetParameter { .. }) => self.ask_parameters(talk, now),
+            Event::Fault(Some(_)) if self.burst.is_none() => {
+                self.burst = Some(Burst { next: 0, count: None, due: now + BURST, tries: 0, asked: false });
+            }
+            _ => {}
+        }
+        Ok(())
+    }
+
+    /// Does what is due. Returns what became of the link in the last second, once a second.
+    ///
+    /// # Errors
+    /// The recording has stopped.
+    pub fn turn(&mut self, talk: &mut Talk, now: Instant) -> Result<Option<LinkStatus>, RecordingError> {
+        if self.changed.is_some_and(|due| due <= now) {
+            self.changed = None;
+            self.told_parameters(talk, now)?;
+        }
+        if self.phase == Phase::Records
+            && let Some(burst) = &mut self.burst
+            && !burst.asked
+            && burst.due <= now
+        {
+            burst.asked = true;
+            talk.ask_aside(Request::Burst { index: burst.next }, now);
+        }
+        if self.status_due.is_some_and(|due| due <= now) {
+            self.status_due = Some(now + STATUS);
+            return self.status(now).map(Some);
+        }
+        Ok(None)
+    }
+
+    /// The link was cut: what comes after has no connexion with what came before.
+    ///
+    /// # Errors
+    /// The recording has stopped.
+    pub fn cut(&mut self, words: &str, now: Instant) -> Result<(), RecordingError> {
+        if self.phase == Phase::Nobody {
+            return Ok(());
+        }
+        self.phase = Phase::Nobody;
+        (self.changed, self.burst, self.status_due) = (None, None, None);
+        self.kept.clear();
+        self.totals.gaps += 1;
+        self.status(now)?;
+        self.write(now, |writer, device, at| writer.gap(device, at, words))
+    }
+
+    /// The last status of the link.
+    ///
+    /// # Errors
+    /// The recording has stopped.
+    pub fn finish(&mut self, now: Instant) -> Result<(), RecordingError> {
+        if self.phase != Phase::Nobody {
+            self.status(now)?;
+        }
+        Ok(())
+    }
+
+    fn status(&mut self, now: Instant) -> Result<LinkStatus, RecordingError> {
+        let mut status = LinkStatus::default();
+        self.write(now, |writer, device, at| {
+            status = writer.link(device, at)?;
+            Ok(())
+        })?;
+        self.totals.add(&status);
+        Ok(status)
+    }
+
+    fn open(&mut self, firmware: &Firmware, talk: &mut Talk, now: Instant) -> Result<(), RecordingError> {
+        let identity = std::mem::take(&mut self.identity);
+        let Ok(Reply::Identity { identity: who, .. }) = Reply::<MAX_JOINTS>::decode(&identity) else {
+            return Ok(());
+        };
+        let mut about = About::of(&who);
+        about.port = Some(self.port.clone());
+        // A socket or a pseudo-terminal has no speed, but what is behind it does.
+        about.baud = Some(BAUD);
+        let hand = self.hand(firmware);
+        if let Some(file) = &hand {
+            about = about.with_hand(file);
+        }
+        self.totals.sessions += 1;
+        let kept = std::mem::take(&mut self.kept);
+        self.write(now, |writer, device, at| {
+            writer.about(device, at, &about)?;
+            if hand.is_none() {
+                let words = "the hand's file is not known: there are counts, but no angles";
+                writer.event(device, at, Level::Warning, words)?;
+            }
+            kept.iter().rev().try_for_each(|payload| writer.sent(device, at, payload))?;
+            writer.received(device, at, &identity).map(|_| ())
+        })?;
+        let joint_count = u8::try_from(firmware.joint_count).unwrap_or(u8::MAX);
+        let each = |&parameter: &Parameter| {
+            let count = match parameter.each() {
+                Each::Hand => 1,
+                Each::Joint => joint_count,
+                Each::Axis => 3,
+            };
+            (0..count).map(move |index| Setting { parameter, index, value: None })
+        };
+        self.settings = Parameter::ALL.iter().flat_map(each).collect();
+        self.status_due = Some(now + STATUS);
+        self.asked = 0;
+        self.ask_parameters(talk, now);
+        Ok(())
+    }
+
+    /// The file of a firmware's hand, among those that are known.
+    fn hand(&self, firmware: &Firmware) -> Option<HandFile> {
+        let names = self.hands.iter().chain([&firmware.hand]);
+        let known = names.filter_map(|name| HandModel::load_with_file(name).ok());
+        known.into_iter().find(|(model, _)| model.hash() == firmware.hand_hash).map(|(_, file)| file)
+    }
+
+    fn ask_parameters(&mut self, talk: &mut Talk, now: Instant) {
+        self.phase = Phase::Parameters(self.settings.len());
+        for &Setting { parameter, index, .. } in &self.settings {
+            talk.ask_aside(Request::GetParameter { parameter, index }, now);
+        }
+    }
+
+    fn set(&mut self, parameter: Parameter, index: u8, value: Option<f32>) {
+        let known = (self.settings.iter_mut())
+            .find(|setting| (setting.parameter, setting.index) == (parameter, index));
+        if let Some(setting) = known {
+            setting.value = value;
+        }
+    }
+
+    /// All parameters are known: they are written down, and records asked for, with a snapshot.
+    fn told_parameters(&mut self, talk: &mut Talk, now: Instant) -> Result<(), RecordingError> {
+        let settings = std::mem::take(&mut self.settings);
+        self.write(now, |writer, device, at| writer.parameters(device, at, &settings))?;
+        self.settings = settings;
+        self.phase = Phase::Telemetry;
+        talk.ask_aside(self.telemetry(), now);
+        Ok(())
+    }
+
+    /// An answer to what was asked aside.
+    fn answered(
+        &mut self,
+        request: &Request,
+        answer: Option<&Answer>,
+        talk: &mut Talk,
+        now: Instant,
+    ) -> Result<(), RecordingError> {
+        match (request, answer) {
+            (&Request::GetParameter { parameter, index }, Some(answer)) => {
+                match answer {
+                    Answer::Value(value) => self.set(parameter, index, Some(*value)),
+                    Answer::Refused(Refusal::Busy) => {
+                        talk.ask_aside(request.clone(), now);
+                        return Ok(());
+                    }
+                    // Switched off.
+                    _ => self.set(parameter, index, None),
+                }
+                if let Phase::Parameters(left) = &mut self.phase {
+                    *left = left.saturating_sub(1);
+                    if *left == 0 {
+                        self.told_parameters(talk, now)?;
+                    }
+                }
+            }
+            (Request::Telemetry { .. }, Some(Answer::Done)) => {
+                if self.phase == Phase::Telemetry {
+                    self.phase = Phase::Records;
+                }
+            }
+            (Request::GetParameter { .. } | Request::Telemetry { .. }, _) => {
+                self.asked += 1;
+                if self.asked > TRIES * 2 {
+                    let words = format!("no answer to {request:?}");
+                    self.write(now, |writer, device, at| writer.event(device, at, Level::Error, &words))?;
+                } else {
+                    talk.ask_aside(request.clone(), now);
+                }
+            }
+            (&Request::Burst { index }, answer) => self.caught(index, answer, now)?,
+            _ => {}
+        }
+        Ok(())
+    }
+
+    /// An answer to the request for a record of a burst. The record itself is among the payloads.
+    fn caught(&mut self, index: u16, answer: Option<&Answer>, now: Instant) -> Result<(), RecordingError> {
+        let Some(burst) = self.burst.as_mut().filter(|burst| burst.next == index) else { return Ok(()) };
+        burst.asked = false;
+        burst.due = now + BURST;
+        let words = match answer {
+            Some(Answer::Burst { count, .. }) => {
+                burst.count = Some(*count);
+                burst.next += 1;
+                burst.tries = 0;
+                if burst.next < *count {
+                    return Ok(());
+                }
+                format!("the records around the fault are read out: {count}")
+            }
+            Some(Answer::Refused(Refusal::BurstNotOver | Refusal::Busy)) => return Ok(()),
+            Some(Answer::Refused(Refusal::NoBurst)) if burst.count.is_none() => {
+                self.burst = None;
+                return Ok(());
+            }
+            None if burst.tries < TRIES => {
+                burst.tries += 1;
+                return Ok(());
+            }
+            _ => format!("of the records around the fault, only {index} were read out: the hand was armed"),
+        };
+        self.burst = None;
+        self.write(now, |writer, device, at| writer.event(device, at, Level::Info, &words))
+    }
+
+    fn write(
+        &self,
+        now: Instant,
+        write: impl FnOnce(&mut Writer, Device, Stamp) -> Result<(), RecordingError>,
+    ) -> Result<(), RecordingError> {
+        let at = self.recording.stamp(now);
+        match (self.recording.lock().as_mut(), self.device) {
+            (Some(writer), Some(device)) => write(writer, device, at),
+            _ => Ok(()),
+        }
+    }
+}
+
+/// Whether a payload is an introduction.
+fn is_identity(payload: &[u8]) -> bool {
+    payload.first() == Some(&0)
+}

@@ -1,0 +1,442 @@
+//! `blindgrasp record`, `console --out` and `serve` end to end: real processes, a pseudo-terminal, and time that passes.
+//!
+//!     cargo test --release -p blindgrasp --test record -- --show-output --include-ignored
+#![cfg(unix)]
+
+use blindgrasp::record::mcap::{Decoded, Decoder, Recording, Stamp, What};
+use blindgrasp_shared::fault::Fault;
+use blindgrasp_shared::link::message::Reply;
+use blindgrasp_shared::supervisor::Mode;
+use blindgrasp_shared::telemetry::snapshot::Collector;
+use nix::sys::signal::{Signal, kill};
+use nix::unistd::Pid;
+use serde_json::Value;
+use std::fs;
+use std::io::{BufRead as _, BufReader, Read as _, Write as _};
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Stdio};
+use std::thread;
+use std::time::{Duration, Instant};
+use tempfile::TempDir;
+
+/// How long a process may take for what takes a moment.
+const PATIENCE: Duration = Duration::from_secs(20);
+
+/// The command. Where that is allowed, it goes before what else this machine does: real time is measured here.
+fn blindgrasp(arguments: &[&str]) -> Command {
+    let mut command = Command::new("nice");
+    command.args(["-n", "-10", env!("CARGO_BIN_EXE_blindgrasp")]).args(arguments);
+    command.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped());
+    command
+}
+
+/// A process that is gone when this is dropped.
+struct Process(Child);
+
+impl Process {
+    fn start(mut command: Command) -> Self {
+        Self(command.spawn().expect("the command starts"))
+    }
+
+    fn signal(&self, signal: Signal) {
+        kill(Pid::from_raw(self.0.id() as i32), signal).expect("a signal");
+    }
+
+    /// Exit code, stdout and stderr at its end.
+    fn end(&mut self, patience: Duration) -> (Option<i32>, String, String) {
+        let begun = Instant::now();
+        let status = loop {
+            if let Some(status) = self.0.try_wait().expect("it can be waited for") {
+                break status;
+            }
+            assert!(begun.elapsed() < patience, "it does not end");
+            thread::sleep(Duration::from_millis(5));
+        };
+        let (mut said, mut errors) = (String::new(), String::new());
+        if let Some(mut stdout) = self.0.stdout.take() {
+            stdout.read_to_string(&mut said).expect("UTF-8");
+        }
+        if let Some(mut stderr) = self.0.stderr.take() {
+            stderr.read_to_string(&mut errors).expect("UTF-8");
+        }
+        (status.code(), said, errors)
+    }
+
+    /// Time of a processor that it has used, s.
+    fn processor_s(&self) -> f64 {
+        let stat = fs::read_to_string(format!("/proc/{}/stat", self.0.id())).expect("it runs");
+        // Behind the name, which may contain anything: user and system time are the 14th and 15th field, in 1/100 s.
+        let fields: Vec<&str> = stat.rsplit(')').next().expect("a name").split_whitespace().collect();
+        [fields[11], fields[12]].map(|field| field.parse::<f64>().expect("a number")).iter().sum::<f64>()
+            / 100.0
+    }
+}
+
+impl Drop for Process {
+    fn drop(&mut self) {
+        let _ = self.0.kill();
+        let _ = self.0.wait();
+    }
+}
+
+/// A hand that is served at a link.
+fn serve(link: &Path, arguments: &[&str]) -> Process {
+    let link = link.to_str().expect("UTF-8");
+    let mut hand = Process::start(blindgrasp(&[&["serve", "cube", "--link", link], arguments].concat()));
+    let mut line = String::new();
+    let mut stdout = BufReader::new(hand.0.stdout.take().expect("stdout"));
+    stdout.read_line(&mut line).expect("a line");
+    assert!(line.starts_with("port /"), "{line}");
+    hand
+}
+
+fn recorded(out: &Path, links: &[&Path], arguments: &[&str]) -> Command {
+    let mut all = vec!["record", "--json", "--out", out.to_str().expect("UTF-8")];
+    for link in links {
+        all.extend(["--port", link.to_str().expect("UTF-8")]);
+    }
+    all.extend(arguments);
+    blindgrasp(&all)
+}
+
+/// What a file holds of a device.
+#[derive(Default)]
+struct Content {
+    records: Vec<Decoded>,
+    sessions: usize,
+    settings: usize,
+    /// How many records were there before each gap.
+    gaps: Vec<usize>,
+    /// Ticks of whole snapshots.
+    snapshots: Vec<u32>,
+    /// Records around a fault.
+    burst: usize,
+    last_received: Option<Stamp>,
+    damaged: bool,
+}
+
+fn read(path: &Path) -> Vec<Content> {
+    let recording = Recording::open(path).unwrap_or_else(|error| panic!("{}: {error}", path.display()));
+    let mut contents: Vec<Content> = recording.devices().iter().map(|_| Content::default()).collect();
+    let mut collectors: Vec<Collector> = contents.iter().map(|_| Collector::new()).collect();
+    let mut decoder = Decoder::new();
+    let mut entries = recording.entries().expect("entries");
+    for entry in &mut entries {
+        let entry = entry.expect("an entry");
+        let content = &mut contents[entry.device];
+        match &entry.what {
+            What::About(_) => content.sessions += 1,
+            What::Parameters(settings) => content.settings = content.settings.max(settings.len()),
+            What::Gap { .. } => content.gaps.push(content.records.len()),
+            What::Received(payload) => {
+                content.last_received = content.last_received.max(Some(entry.at));
+                match Reply::<{ blindgrasp::MAX_JOINTS }>::decode(payload) {
+                    Ok(Reply::Snapshot(part)) => {
+                        let whole = collectors[entry.device].add(&part).map(|(tick, _)| tick);
+                        content.snapshots.extend(whole);
+                    }
+                    Ok(Reply::Burst { .. }) => content.burst += 1,
+                    _ => {}
+                }
+            }
+            _ => {}
+        }
+        content.records.extend(decoder.take(&entry));
+    }
+    let damaged = !entries.damage().is_none();
+    contents.iter_mut().for_each(|content| content.damaged = damaged);
+    contents
+}
+
+/// The part of the records that has every tick: from the first of two neighbours on.
+fn every_tick(records: &[Decoded]) -> &[Decoded] {
+    let begin =
+        records.windows(2).position(|pair| pair[1].record.tick == pair[0].record.tick.wrapping_add(1));
+    &records[begin.expect("neighbours")..]
+}
+
+/// Asserts that no tick is missing.
+fn assert_whole(records: &[Decoded]) {
+    for pair in every_tick(records).windows(2) {
+        assert_eq!(pair[1].record.tick, pair[0].record.tick.wrapping_add(1), "{} lost", pair[1].lost_before);
+    }
+}
+
+/// Records a hand that does nothing for so long; returns the shares of a processor that recording and serving took.
+fn idle_hand(seconds: u32) -> [f64; 2] {
+    let folder = TempDir::new().expect("a folder");
+    let (link, out) = (folder.path().join("hand"), folder.path().join("idle.mcap"));
+    let hand = serve(&link, &[]);
+    let mut record = Process::start(recorded(&out, &[&link], &["--duration", &seconds.to_string()]));
+    let begun = Instant::now();
+    let served_s = hand.processor_s();
+    thread::sleep(Duration::from_millis(u64::from(seconds) * 1000 - 500));
+    let shares =
+        [record.processor_s(), hand.processor_s() - served_s].map(|s| s / begun.elapsed().as_secs_f64());
+    let (code, said, errors) = record.end(PATIENCE);
+    let report: Value = serde_json::from_str(&said).expect("JSON");
+    println!(
+        "{seconds} s: {} records, none missing; recording takes {:.1} %, serving {:.1} % of a processor",
+        report["records"],
+        1e2 * shares[0],
+        1e2 * shares[1]
+    );
+    assert_eq!((code, &report["whole"]), (Some(0), &Value::Bool(true)), "{said}\n{errors}");
+    let [content] = &read(&out)[..] else { panic!("one device") };
+    assert!(!content.damaged && content.gaps.is_empty());
+    assert_eq!((content.sessions, content.settings), (1, 24 + 2 + 11 * 9));
+    assert_whole(&content.records);
+    assert_eq!(report["records"].as_u64(), Some(content.records.len() as u64));
+    // Everything but the first moments, in which parameters are read.
+    let ticks = every_tick(&content.records).len() as f64;
+    assert!(ticks > 1e3 * f64::from(seconds) - 1500.0, "{ticks} ticks");
+    assert!(content.snapshots.len() as u32 + 2 >= seconds, "{} snapshots", content.snapshots.len());
+    // Four times what it is without optimization.
+    assert!(cfg!(debug_assertions) || shares[0] < 0.15, "{shares:?}");
+    shares
+}
+
+#[test]
+fn every_tick_is_recorded() {
+    idle_hand(10);
+}
+
+#[test]
+#[ignore = "takes a minute"]
+fn every_tick_of_a_minute_is_recorded() {
+    idle_hand(60);
+}
+
+#[test]
+fn a_script_is_recorded_with_its_grasp_a_fault_and_what_was_caught_around_it() {
+    let folder = TempDir::new().expect("a folder");
+    let (link, out) = (folder.path().join("hand"), folder.path().join("grasp.mcap"));
+    let _hand = serve(&link, &["--fail-after", "1.5"]);
+    let (port, path) = (link.to_str().expect("UTF-8"), out.to_str().expect("UTF-8"));
+    let mut command = blindgrasp(&["console", "--port", port, "--out", path]);
+    command.stdin(Stdio::piped());
+    let mut console = Process::start(command);
+    let mut stdin = console.0.stdin.take().expect("stdin");
+    let mut type_and_wait = |line: &str, milliseconds| {
+        writeln!(stdin, "{line}").expect("the line is taken");
+        thread::sleep(Duration::from_millis(milliseconds));
+    };
+    type_and_wait("arm", 1500);
+    // The fault comes, and its 256 records are read out in the 5 s that the line has time for.
+    type_and_wait("grasp", 9000);
+    type_and_wait("clear", 100);
+    type_and_wait("set force_n 4", 1500);
+    drop(stdin);
+    let (code, said, errors) = console.end(PATIENCE);
+    assert_eq!(code, Some(0), "{said}\n{errors}");
+    let [content] = &read(&out)[..] else { panic!("one device") };
+    assert_whole(&content.records);
+    let modes: Vec<Mode> = content.records.iter().map(|decoded| decoded.record.mode).collect();
+    let mut passed = modes.clone();
+    passed.dedup();
+    assert_eq!(passed, [Mode::Disarmed, Mode::Armed, Mode::Grasping, Mode::Fault, Mode::Disarmed]);
+    let grasping = modes.iter().filter(|mode| **mode == Mode::Grasping).count();
+    assert!((1499..=1501).contains(&grasping), "{grasping} ticks");
+    let fault = content.records.iter().find_map(|decoded| decoded.record.fault).expect("a fault");
+    assert_eq!(fault.fault, Fault::SampleMissing);
+    assert_eq!(content.burst, 256);
+    // After the parameter was set: a state to go on from, at once.
+    assert!(content.snapshots.windows(2).any(|pair| (1..1000).contains(&pair[1].wrapping_sub(pair[0]))));
+    let angles = content.records.iter().filter(|decoded| !decoded.angles_rad.as_slice().is_empty()).count();
+    assert!(angles + 200 > content.records.len(), "{angles} records with angles");
+}
+
+#[test]
+fn a_hand_that_is_cut_off_is_waited_for_and_another_loses_nothing() {
+    let folder = TempDir::new().expect("a folder");
+    let links = ["left", "right"].map(|name| folder.path().join(name));
+    let out = folder.path().join("two.mcap");
+    let [left, _right] = [&links[0], &links[1]].map(|link| serve(link, &[]));
+    let mut record = Process::start(recorded(&out, &[&links[0], &links[1]], &["--duration", "9"]));
+    thread::sleep(Duration::from_secs(3));
+    left.signal(Signal::SIGKILL);
+    drop(left);
+    thread::sleep(Duration::from_secs(1));
+    let _left = serve(&links[0], &[]);
+    let back = Stamp::now();
+    let (code, said, errors) = record.end(PATIENCE);
+    assert_eq!(code, Some(1), "{said}\n{errors}");
+    assert!(errors.contains("; waiting for it to come back") && errors.contains("back after "), "{errors}");
+    let report: Value = serde_json::from_str(&said).expect("JSON");
+    assert_eq!((&report["whole"], &report["error"]), (&Value::Bool(false), &Value::Null));
+    assert_eq!((&report["devices"][0]["gaps"], &report["devices"][1]["gaps"]), (&1.into(), &0.into()));
+    assert!(report["devices"][0]["gaps_s"].as_f64().is_some_and(|s| (0.9..4.0).contains(&s)), "{said}");
+    assert_eq!((&report["devices"][1]["missing"], &report["devices"][1]["sessions"]), (&0.into(), &1.into()));
+    let [left, right] = &read(&out)[..] else { panic!("two devices") };
+    assert!(!left.damaged && right.gaps.is_empty());
+    assert_whole(&right.records);
+    assert!(every_tick(&right.records).len() > 7500, "{}", right.records.len());
+    let [gap] = left.gaps[..] else { panic!("{:?}", left.gaps) };
+    assert_eq!(left.sessions, 2);
+    let (before, after) = left.records.split_at(gap);
+    assert_whole(before);
+    assert_whole(after);
+    // Another hand than before, which has just been switched on.
+    assert!(after[0].record.tick < before[before.len() - 1].record.tick);
+    let resumed_ms = (after[0].arrived.0.saturating_sub(back.0)) as f64 / 1e6;
+    println!("recorded again {resumed_ms:.0} ms after it was back");
+    assert!(resumed_ms < 3000.0, "{resumed_ms} ms");
+}
+
+/// Kills a recording after this time, and looks at what is left: the time of which nothing was saved, s.
+fn killed(folder: &Path, link: &Path, number: usize, after: Duration) -> f64 {
+    let out = folder.join(format!("killed-{number}.mcap"));
+    let record = Process::start(recorded(&out, &[link], &[]));
+    let begun = Instant::now();
+    while !out.exists() {
+        assert!(begun.elapsed() < PATIENCE, "no file");
+        thread::sleep(Duration::from_millis(1));
+    }
+    let first = Stamp::now();
+    thread::sleep(after);
+    let end = Stamp::now();
+    record.signal(Signal::SIGKILL);
+    drop(record);
+    let bytes = fs::read(&out).expect("the file");
+    for message in mcap::MessageStream::new(&bytes).expect("MCAP") {
+        message.unwrap_or_else(|error| panic!("{number}, after {after:?}: {error}"));
+    }
+    let contents = read(&out);
+    assert!(contents.iter().all(|content| !content.damaged), "{number}, after {after:?}");
+    let last = contents.first().and_then(|content| content.last_received).unwrap_or(first).max(first);
+    fs::remove_file(&out).expect("the file goes");
+    end.0.saturating_sub(last.0) as f64 / 1e9
+}
+
+#[test]
+fn what_was_killed_at_any_moment_is_whole_to_the_last_second() {
+    const HANDS: usize = 5;
+    const KILLS: usize = 20;
+    let folder = TempDir::new().expect("a folder");
+    let lost_s: Vec<f64> = thread::scope(|scope| {
+        let hands: Vec<_> = (0..HANDS)
+            .map(|hand| {
+                let folder = folder.path();
+                scope.spawn(move || {
+                    let link = folder.join(format!("hand-{hand}"));
+                    let _hand = serve(&link, &[]);
+                    let mut random = fastrand::Rng::with_seed(hand as u64);
+                    (0..KILLS)
+                        .map(|kill| {
+                            let after = Duration::from_millis(random.u64(0..2000));
+                            killed(folder, &link, KILLS * hand + kill, after)
+                        })
+                        .collect::<Vec<f64>>()
+                })
+            })
+            .collect();
+        hands.into_iter().flat_map(|hand| hand.join().expect("no panic")).collect()
+    });
+    let most_s = lost_s.iter().copied().fold(0.0, f64::max);
+    let mean_s = lost_s.iter().sum::<f64>() / lost_s.len() as f64;
+    println!(
+        "{} recordings were killed: at most {most_s:.3} s were lost, {mean_s:.3} s on average",
+        lost_s.len()
+    );
+    assert_eq!(lost_s.len(), HANDS * KILLS);
+    assert!(most_s <= 1.0, "{most_s} s");
+}
+
+#[test]
+fn a_full_disk_stops_the_recording_and_what_was_saved_is_good() {
+    let folder = TempDir::new().expect("a folder");
+    let (link, out) = (folder.path().join("hand"), folder.path().join("full.mcap"));
+    let _hand = serve(&link, &[]);
+    // No file may be longer than 200 KiB; a write beyond that is an error, and no signal.
+    let mut command = Command::new("sh");
+    command.args(["-c", "trap '' XFSZ; ulimit -f 400; exec \"$@\"", "sh", env!("CARGO_BIN_EXE_blindgrasp")]);
+    command.args(["record", "--json", "--duration", "30", "--port"]).arg(&link).arg("--out").arg(&out);
+    command.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped());
+    let mut record = Process::start(command);
+    let (code, said, errors) = record.end(Duration::from_secs(25));
+    assert_eq!(code, Some(1), "{said}\n{errors}");
+    assert!(errors.contains("the recording has stopped: "), "{errors}");
+    let report: Value = serde_json::from_str(&said).expect("JSON");
+    assert!(report["error"].as_str().is_some_and(|error| error.contains(" records, ")), "{said}");
+    assert!(fs::metadata(&out).expect("the file").len() <= 200 << 10);
+    let [content] = &read(&out)[..] else { panic!("one device") };
+    assert!(!content.damaged);
+    assert!(content.records.len() > 200, "{} records", content.records.len());
+    assert_whole(&content.records);
+}
+
+#[test]
+fn a_slow_line_is_recorded_with_all_that_it_lost() {
+    let folder = TempDir::new().expect("a folder");
+    let (link, out) = (folder.path().join("hand"), folder.path().join("slow.mcap"));
+    let _hand = serve(&link, &["--baud", "230400"]);
+    let mut record = Process::start(recorded(&out, &[&link], &["--duration", "5"]));
+    let (code, said, errors) = record.end(PATIENCE);
+    assert_eq!(code, Some(1), "{said}\n{errors}");
+    let report: Value = serde_json::from_str(&said).expect("JSON");
+    let device = &report["devices"][0];
+    // A quarter of the line: every fourth tick, or fewer.
+    assert!(device["decimation"].as_u64().is_some_and(|ticks| (2..=16).contains(&ticks)), "{said}");
+    let [content] = &read(&out)[..] else { panic!("one device") };
+    let (first, last) = (&content.records[0].record, &content.records[content.records.len() - 1].record);
+    let missing: u64 = content.records.iter().map(|decoded| decoded.lost_before).sum();
+    assert_eq!(u64::from(last.sequence - first.sequence) + 1, content.records.len() as u64 + missing);
+    assert_eq!(device["missing"].as_u64(), Some(missing), "{said}");
+    assert!(device["dropped_by_device"].as_u64() >= Some(1) && missing >= 1, "{said}");
+}
+
+#[test]
+fn misuse_is_told() {
+    let folder = TempDir::new().expect("a folder");
+    let out = folder.path().join("a.mcap");
+    let path = out.to_str().expect("UTF-8");
+    let refused = |arguments: &[&str], words: &[&str]| {
+        let (code, said, errors) = Process::start(blindgrasp(arguments)).end(PATIENCE);
+        assert_eq!((code, said.as_str()), (Some(2), ""), "{arguments:?}: {errors}");
+        assert!(words.iter().all(|word| errors.contains(word)), "{arguments:?}: {errors}");
+    };
+    refused(&["record", "--out", path], &["which port?", "this machine has "]);
+    refused(
+        &["record", "--out", path, "--port", "/dev/no"],
+        &["cannot open the serial port /dev/no", "this machine has"],
+    );
+    refused(&["record", "--out", path, "--port", "a", "--port", "a"], &["one is named twice"]);
+    refused(&["record", "--out", path, "--port", "a", "--duration", "0"], &["--duration"]);
+    refused(&["record", "--out", path, "--port", "a", "--hand", "nobody"], &["nobody"]);
+    assert!(!out.exists());
+
+    // Somebody is there, but says nothing.
+    let silent = folder.path().join("silent");
+    let _listener = std::os::unix::net::UnixListener::bind(&silent).expect("a socket");
+    let port = format!("unix:{}", silent.display());
+    refused(&["record", "--out", path, "--port", &port], &["nothing answers within 3 s"]);
+    assert!(!out.exists(), "a file without anything in it");
+
+    // A file is not overwritten.
+    let link: PathBuf = folder.path().join("hand");
+    let _hand = serve(&link, &[]);
+    fs::write(&out, "mine").expect("a file");
+    let port = link.to_str().expect("UTF-8");
+    refused(&["record", "--out", path, "--port", port], &["is there already", "--force"]);
+    assert_eq!(fs::read(&out).expect("the file"), b"mine");
+    let mut record = Process::start(recorded(&out, &[&link], &["--force", "--duration", "1"]));
+    assert_eq!(record.end(PATIENCE).0, Some(0));
+}
+
+#[test]
+fn an_interrupt_ends_a_recording_cleanly() {
+    let folder = TempDir::new().expect("a folder");
+    let (link, out) = (folder.path().join("hand"), folder.path().join("a.mcap"));
+    let hand = serve(&link, &[]);
+    let mut record = Process::start(recorded(&out, &[&link], &[]));
+    thread::sleep(Duration::from_secs(2));
+    record.signal(Signal::SIGINT);
+    let (code, said, errors) = record.end(PATIENCE);
+    assert_eq!(code, Some(0), "{said}\n{errors}");
+    assert!(Recording::open(&out).expect("a recording").is_finished());
+    hand.signal(Signal::SIGINT);
+    let mut hand = hand;
+    let (code, _, errors) = hand.end(PATIENCE);
+    assert_eq!(code, Some(0), "{errors}");
+    assert!(errors.contains(" ticks, ") && !link.exists(), "{errors}");
+}
