@@ -1,5 +1,7 @@
 //! What recording and reading cost: a record of twelve joints.
 
+#![allow(clippy::unwrap_used)]
+
 use blindgrasp::MAX_JOINTS;
 use blindgrasp::record::mcap::{Decoder, Entry, Recording, What, Writer};
 use blindgrasp::scene::Scene;
