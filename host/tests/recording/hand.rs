@@ -25,7 +25,7 @@ fn payload(frame: &[u8]) -> Vec<u8> {
 }
 
 /// Who a hand of `models/hands` is.
-pub fn about(hand: &str) -> About {
+pub(crate) fn about(hand: &str) -> About {
     let file = HandFile::load(hand).unwrap();
     let model = HandModel::load(hand).unwrap();
     About::of(&Identity {
@@ -49,7 +49,7 @@ pub fn about(hand: &str) -> About {
 }
 
 /// All parameters of a hand.
-pub fn settings(hand: &str) -> Vec<Setting> {
+pub(crate) fn settings(hand: &str) -> Vec<Setting> {
     let model = HandModel::load(hand).unwrap();
     let params =
         Params::<f32, MAX_JOINTS, { blindgrasp::MAX_FINGERS }>::new(model.hand.cast(), &model.config);
@@ -57,14 +57,14 @@ pub fn settings(hand: &str) -> Vec<Setting> {
 }
 
 /// A hand that does what chance wants.
-pub struct Hand {
-    pub record: Record,
+pub(crate) struct Hand {
+    pub(crate) record: Record,
     joints: usize,
     sender: Sender<MAX_JOINTS>,
 }
 
 impl Hand {
-    pub fn new(joints: usize) -> Self {
+    pub(crate) fn new(joints: usize) -> Self {
         let record = Record {
             sequence: 0,
             tick: 0,
@@ -90,7 +90,7 @@ impl Hand {
     }
 
     /// The next record, and the payload that it makes.
-    pub fn tick(&mut self, random: &mut fastrand::Rng) -> (Record, Vec<u8>) {
+    pub(crate) fn tick(&mut self, random: &mut fastrand::Rng) -> (Record, Vec<u8>) {
         let record = &mut self.record;
         record.sequence = record.sequence.wrapping_add(1);
         record.tick = record.tick.wrapping_add(1);
@@ -143,7 +143,7 @@ impl Hand {
 }
 
 /// All entries of a file, and what was wrong with it.
-pub fn read(path: &Path) -> (Vec<Entry>, blindgrasp::record::mcap::Damage, Recording) {
+pub(crate) fn read(path: &Path) -> (Vec<Entry>, blindgrasp::record::mcap::Damage, Recording) {
     let recording = Recording::open(path).unwrap();
     let mut entries = recording.entries().unwrap();
     let all = entries.by_ref().map(Result::unwrap).collect();
@@ -152,6 +152,6 @@ pub fn read(path: &Path) -> (Vec<Entry>, blindgrasp::record::mcap::Damage, Recor
 }
 
 /// Whether an entry is one that the writer made by itself.
-pub fn is_derived(entry: &Entry) -> bool {
+pub(crate) fn is_derived(entry: &Entry) -> bool {
     matches!(&entry.what, What::Event { about, .. } if about != "event")
 }

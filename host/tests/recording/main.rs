@@ -1,5 +1,7 @@
 //! Recordings: what is written comes back, from whole files and from damaged ones, here and in Python.
 
+#![allow(clippy::unwrap_used)]
+
 mod damage;
 mod full_disk;
 mod hand;
