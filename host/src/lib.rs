@@ -13,6 +13,8 @@ pub type Posture = blindgrasp_shared::hand::Posture<f64, MAX_JOINTS, MAX_FINGERS
 
 #[cfg(feature = "command")]
 pub mod device;
+#[cfg(feature = "command")]
+pub mod monitor;
 pub mod plant;
 pub mod record;
 #[cfg(feature = "command")]

@@ -4,6 +4,7 @@ use super::Outcome;
 use anyhow::Context;
 use blindgrasp::record::run_dir::RunDir;
 use blindgrasp::scene::Scene;
+use blindgrasp::sim::recorder::Recorder;
 use blindgrasp::sim::summary::Summary;
 use blindgrasp::sim::{Run, Simulation};
 use blindgrasp::{record, report};
@@ -20,10 +21,10 @@ use std::path::PathBuf;
 pub(crate) struct Arguments {
     /// A built-in scene (prism, cube, prism-ideal, cube-ideal, cube-normal-only, two-finger-prism) or the path of a scene file
     scene: String,
-    /// Write summary, effective scene, trace, plots, pictures and an animation to this directory
-    #[arg(long, value_name = "DIR")]
+    /// Write summary, effective scene, trace, plots, pictures, an animation and a recording to this directory; if the name ends in .mcap, write the recording alone, to this file
+    #[arg(long, value_name = "DIR|FILE.mcap")]
     out: Option<PathBuf>,
-    /// Overwrite a run in the directory
+    /// Overwrite a run in the directory, or the file
     #[arg(long, requires = "out")]
     force: bool,
     /// Print the summary as one JSON object
@@ -42,24 +43,48 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
     let mut settings = arguments.settings.clone();
     settings.extend(arguments.duration.map(|s| format!("duration_s={s:?}")));
     let scene = Scene::load(&arguments.scene, &settings)?;
-    let directory = match &arguments.out {
-        Some(path) => Some(RunDir::choose(path, arguments.force)?),
-        None => None,
+    let (directory, recording) = match &arguments.out {
+        Some(path) if path.extension().is_some_and(|extension| extension == "mcap") => {
+            (None, Some(path.clone()))
+        }
+        Some(path) => (Some(RunDir::choose(path, arguments.force)?), Some(path.join("record.mcap"))),
+        None => (None, None),
     };
     for warning in &scene.warnings {
         eprintln!("blindgrasp: warning: {warning}");
     }
     let simulation = Simulation::new(&scene).with_context(|| format!("scene {}", scene.name))?;
+    let mut recorder = match &recording {
+        Some(path) => {
+            if let Some(directory) = &directory {
+                directory.create()?;
+            }
+            Some(Recorder::create(path, arguments.force, &scene, simulation.controller())?)
+        }
+        None => None,
+    };
     let bar = progress_bar(scene.duration_s);
-    let run = simulation.run(|t_s| bar.set_position((t_s * 1e3) as u64));
+    let run = simulation.run_watched(
+        |t_s| bar.set_position((t_s * 1e3) as u64),
+        |controller| {
+            if let Some(recorder) = &mut recorder {
+                recorder.tick(controller);
+            }
+        },
+    );
     bar.finish_and_clear();
 
     let text =
         if arguments.json { serde_json::to_string(&run.summary)? + "\n" } else { describe(&run.summary) };
     io::stdout().lock().write_all(text.as_bytes()).context("cannot print the summary")?;
+    // The recording is nearly all there: what is wrong with it keeps nothing else from being written.
+    let recorded = recorder.map_or(Ok(()), |recorder| recorder.finish().map(|_| ()));
     if let Some(directory) = &directory {
         write_files(directory, &scene, &run)?;
-        eprintln!("blindgrasp: wrote {}", directory.path().display());
+    }
+    recorded?;
+    if let Some(path) = &arguments.out {
+        eprintln!("blindgrasp: wrote {}", path.display());
     }
     Ok(if run.summary.grasp_held { Outcome::Shown } else { Outcome::Failed })
 }

@@ -155,12 +155,24 @@ pub struct OpenError {
     known: Vec<PathBuf>,
 }
 
+/// The serial ports of this machine, in order.
+fn known_ports() -> Vec<PathBuf> {
+    let mut known = serial2::SerialPort::available_ports().unwrap_or_default();
+    known.sort();
+    known
+}
+
+/// What serial ports there are, in words: `this machine has ...`.
+pub fn ports_in_words() -> String {
+    ports(&known_ports())
+}
+
 fn ports(known: &[PathBuf]) -> String {
     if known.is_empty() {
-        return "this machine has none".to_owned();
+        return "this machine has no serial ports".to_owned();
     }
     let names: Vec<String> = known.iter().map(|path| path.display().to_string()).collect();
-    format!("this machine has {}", names.join(", "))
+    format!("this machine has the serial ports {}", names.join(", "))
 }
 
 impl SerialPort {
@@ -171,11 +183,7 @@ impl SerialPort {
     pub fn open(path: &Path, baud: u32) -> Result<Self, OpenError> {
         match serial2::SerialPort::open(path, baud) {
             Ok(port) => Ok(Self { port }),
-            Err(reason) => {
-                let mut known = serial2::SerialPort::available_ports().unwrap_or_default();
-                known.sort();
-                Err(OpenError { path: path.to_owned(), reason, known })
-            }
+            Err(reason) => Err(OpenError { path: path.to_owned(), reason, known: known_ports() }),
         }
     }
 }

@@ -7,6 +7,7 @@ use blindgrasp_shared::event::{Event, Events};
 use blindgrasp_shared::fault::Raised;
 use blindgrasp_shared::parameter::ParameterError;
 use blindgrasp_shared::supervisor::Mode;
+use blindgrasp_shared::telemetry::Record;
 use blindgrasp_shared::tick::{Input, Params, Sensed, State, tick};
 use std::convert::Infallible;
 
@@ -68,6 +69,7 @@ pub struct Stepped {
 pub struct Alone {
     params: Params<f32, MAX_JOINTS, MAX_FINGERS>,
     state: State<f32, MAX_JOINTS, MAX_FINGERS>,
+    record: Option<Record<f32, MAX_JOINTS>>,
 }
 
 impl Alone {
@@ -76,7 +78,23 @@ impl Alone {
     /// # Errors
     /// The first parameter of the scene that the controller refuses.
     pub fn new(scene: &Scene) -> Result<Self, ParameterError> {
-        Ok(Self { params: Params::new(scene.hand.cast(), &scene.controller_config())?, state: State::new() })
+        let params = Params::new(scene.hand.cast(), &scene.controller_config())?;
+        Ok(Self { params, state: State::new(), record: None })
+    }
+
+    /// Its parameters.
+    pub fn params(&self) -> &Params<f32, MAX_JOINTS, MAX_FINGERS> {
+        &self.params
+    }
+
+    /// What it remembers after its last tick.
+    pub fn state(&self) -> &State<f32, MAX_JOINTS, MAX_FINGERS> {
+        &self.state
+    }
+
+    /// What its last tick did; `None` before the first.
+    pub fn record(&self) -> Option<&Record<f32, MAX_JOINTS>> {
+        self.record.as_ref()
     }
 }
 
@@ -90,13 +108,15 @@ impl Controller for Alone {
             command: turn.command.filter(|_| turn.reach != Reach::Nothing),
         };
         let output = tick(&self.params, &mut self.state, &input);
-        Ok(Stepped {
+        let stepped = Stepped {
             torques_nm: output.torques_nm,
             angles_rad: *self.state.angles_rad(),
             speeds_rad_s: *self.state.speeds_rad_s(),
             force_n: output.record.force_n,
             mode: output.record.mode,
             fault: output.record.fault,
-        })
+        };
+        self.record = Some(output.record);
+        Ok(stepped)
     }
 }

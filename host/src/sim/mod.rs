@@ -17,6 +17,8 @@ pub(crate) mod encoders;
 pub mod injection;
 pub(crate) mod motors;
 pub mod observe;
+#[cfg(feature = "command")]
+pub mod recorder;
 pub mod summary;
 
 use crate::MAX_JOINTS;
@@ -87,8 +89,13 @@ impl Simulation {
     }
 
     /// Runs to the end, or until the grasp is lost. `progress` is told the simulated time once in a while.
-    pub fn run(mut self, progress: impl FnMut(f64)) -> Run {
-        let Ok(run) = self.try_run(progress);
+    pub fn run(self, progress: impl FnMut(f64)) -> Run {
+        self.run_watched(progress, |_| {})
+    }
+
+    /// Runs as [`Self::run`], and shows the controller after each of its ticks, the one that arms the hand included.
+    pub fn run_watched(mut self, progress: impl FnMut(f64), watch: impl FnMut(&Alone)) -> Run {
+        let Ok(run) = self.try_run_watched(progress, watch);
         run
     }
 }
@@ -137,9 +144,18 @@ impl<C: Controller> Simulation<C> {
     ///
     /// # Errors
     /// Why the controller can't go on.
-    pub fn try_run(&mut self, mut progress: impl FnMut(f64)) -> Result<Run, C::Error> {
+    pub fn try_run(&mut self, progress: impl FnMut(f64)) -> Result<Run, C::Error> {
+        self.try_run_watched(progress, |_| {})
+    }
+
+    fn try_run_watched(
+        &mut self,
+        mut progress: impl FnMut(f64),
+        mut watch: impl FnMut(&C),
+    ) -> Result<Run, C::Error> {
         // The hand is armed while everything stands still.
         let mut stepped = self.control(None, Some(Command::Arm))?;
+        watch(&self.controller);
         let begun = Instant::now();
         let mut samples = Vec::with_capacity(self.ticks as usize + 1);
         let mut first_fault = None;
@@ -152,6 +168,7 @@ impl<C: Controller> Simulation<C> {
             // 1, 2: sense and control. The first tick is told to grasp.
             let computed_before = stepped.torques_nm;
             stepped = self.control(Some(tick), (tick == 0).then_some(Command::Grasp(Grasp::CONFIGURED)))?;
+            watch(&self.controller);
             first_fault = first_fault.or(stepped.fault.map(|raised| (tick, raised)));
             let wanted_nm = if self.delayed { computed_before } else { stepped.torques_nm };
             if let Err(reason) = self.move_on(t_s, &wanted_nm, &stepped, &mut samples) {

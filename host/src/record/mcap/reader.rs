@@ -441,9 +441,7 @@ impl Summary {
             match kind {
                 op::CHANNEL => summary.channels.push(content.to_vec()),
                 op::STATISTICS => {
-                    let number = |at: usize| {
-                        content.get(at..at + 8)?.try_into().ok().map(u64::from_le_bytes)
-                    };
+                    let number = |at: usize| content.get(at..at + 8)?.try_into().ok().map(u64::from_le_bytes);
                     // Messages, schemas, channels, attachments, metadata, chunks; then the times, and a map's length.
                     let (messages, first, last) = (number(0)?, number(26)?, number(34)?);
                     summary.span = (messages > 0).then_some((Stamp(first), Stamp(last)));
