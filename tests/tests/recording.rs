@@ -50,9 +50,8 @@ fn the_firmware_is_recorded_and_what_is_lost_is_counted() {
             Err(error) => panic!("{error}"),
         }
     }
-    recorder.finish(Instant::now()).expect("it is written");
+    let totals = recorder.finish(Instant::now()).expect("it is written");
     recording.finish().expect("it is written");
-    let totals = *recorder.totals();
 
     let recorded = Recording::open(&path).expect("a recording");
     assert!(recorded.is_finished());
