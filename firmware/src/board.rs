@@ -53,12 +53,14 @@ pub const BAUD: u32 = 1_000_000;
 pub const WATCHDOG_MS: u32 = 10;
 
 /// The counters' clock. The LS7366R takes SCK times of 100 ns high and 100 ns low at 5 V, a little more at 3.3 V; SPI1
-/// divides 84 MHz by a power of two: 84 / 32 = 2.625 MHz, 190 ns each. One counter, 5 bytes, takes 15 us; 12 take 183.
+/// divides 84 MHz by a power of two: 84 / 32 = 2.625 MHz, 190 ns each. What a tick reads of 12 counters, 704 bits with their
+/// status and one of their settings, takes 268 us.
 const COUNTER_CLOCK: Hertz = Hertz::kHz(2_625);
 
-/// The DACs' clock: 42 / 4 = 10.5 MHz, 48 ns high. The AD5754R shows a bit 40 ns after the rising edge and it is taken
-/// at the falling one. One output, 3 bytes, takes 2.3 us; 12 and the instruction to load them take 34.
-const DAC_CLOCK: Hertz = Hertz::kHz(10_500);
+/// The DACs' clock: 42 / 8 = 5.25 MHz, 95 ns high. The AD5754R shows a bit up to 40 ns after the rising edge, and it is
+/// taken at the falling one: twice the clock would leave 8 ns to the wires. What a tick writes to 12 outputs and reads
+/// back, 456 bits, takes 87 us.
+const DAC_CLOCK: Hertz = Hertz::kHz(5_250);
 
 /// The counters' oscillator is 20 MHz. Their input filter wants at least 4 times the frequency of an encoder's line. That
 /// is 159 kHz at the 1,000 rad/s that the motors can do, with 1,000 lines a turn: half of the oscillator, 10 MHz, is

@@ -19,10 +19,12 @@ enum Command {
     Pil(commands::pil::Arguments),
     Flash(commands::flash::Arguments),
     Console(commands::console::Arguments),
+    Monitor(commands::monitor::Arguments),
     Record(commands::record::Arguments),
     #[cfg(unix)]
     Serve(commands::serve::Arguments),
-    Monitor(commands::monitor::Arguments),
+    Replay(commands::replay::Arguments),
+    Export(commands::export::Arguments),
 }
 
 fn main() -> ExitCode {
@@ -31,10 +33,12 @@ fn main() -> ExitCode {
         Command::Pil(arguments) => commands::pil::run(&arguments),
         Command::Flash(arguments) => commands::flash::run(&arguments),
         Command::Console(arguments) => commands::console::run(&arguments),
+        Command::Monitor(arguments) => commands::monitor::run(&arguments),
         Command::Record(arguments) => commands::record::run(&arguments),
         #[cfg(unix)]
         Command::Serve(arguments) => commands::serve::run(&arguments),
-        Command::Monitor(arguments) => commands::monitor::run(&arguments),
+        Command::Replay(arguments) => commands::replay::run(&arguments),
+        Command::Export(arguments) => commands::export::run(&arguments),
     };
     match outcome {
         Ok(commands::Outcome::Shown) => ExitCode::SUCCESS,

@@ -152,7 +152,10 @@ mod with_probes {
             &Elf { machine: 3, ..good.clone() }.bytes(),
             &["built for x86", "--target thumbv7em-none-eabihf"],
         );
-        refuse(&Elf::good(&Image { kind: "pil", ..image() }).bytes(), &["`pil`", "flash the image `hand`"]);
+        refuse(
+            &Elf::good(&Image { kind: "pil", ..image() }).bytes(),
+            &["this is the image `pil`, not `hand`"],
+        );
         let mut nameless = good.clone();
         nameless.segments[0].bytes.truncate(0x200);
         refuse(&nameless.bytes(), &["no identity", "cargo build"]);

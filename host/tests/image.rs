@@ -3,7 +3,7 @@
 mod elf;
 
 use blindgrasp::device::image::{
-    ExpectedHand, Firmware, FitError, Footprint, ImageError, LEAST_STACK_BYTES, Memory, PurposeError,
+    ExpectedHand, Firmware, FitError, Footprint, ImageError, Kind, LEAST_STACK_BYTES, Memory, PurposeError,
 };
 use blindgrasp_shared::identity::Image;
 use blindgrasp_shared::telemetry::INTERFACE_VERSION;
@@ -26,7 +26,7 @@ fn misfit(elf: &Elf) -> FitError {
 
 fn purpose(image: &Image<'_>, hand: Option<&ExpectedHand>) -> Result<(), PurposeError> {
     let file = Elf::good(image).bytes();
-    Firmware::parse(&file).expect("an image").check_purpose(hand)
+    Firmware::parse(&file).expect("an image").check_purpose(Kind::Hand, hand)
 }
 
 #[test]
@@ -87,7 +87,7 @@ fn a_file_with_random_damage_is_judged_without_a_panic() {
             file[random.usize(..end)] = random.choice([0, 1, 0x7f, 0x80, 0xff]).unwrap_or(0);
         }
         let judged = Firmware::parse(&file).is_ok_and(|firmware| {
-            let _ = firmware.check_purpose(None);
+            let _ = firmware.check_purpose(Kind::Hand, None);
             firmware.footprint(&stm32f405()).is_ok()
         });
         *if judged { &mut accepted } else { &mut refused } += 1;
@@ -186,9 +186,13 @@ fn only_the_image_for_this_hand_is_flashed() {
     };
     assert_eq!(purpose(&image(), Some(&changed)), Err(error));
 
-    assert_eq!(purpose(&Image { kind: "pil", ..image() }, None), Err(PurposeError::Emulation));
-    let odd = Image { kind: "boot\n", ..image() };
-    assert_eq!(purpose(&odd, None), Err(PurposeError::OtherKind("boot\\n".to_owned())));
+    let other_kind =
+        |image: &str| Err(PurposeError::OtherKind { image: image.to_owned(), wanted: Kind::Hand });
+    let pil = Image { kind: "pil", ..image() };
+    assert_eq!(purpose(&pil, None), other_kind("pil"));
+    assert_eq!(purpose(&Image { kind: "boot\n", ..image() }, None), other_kind("boot\\n"));
+    let file = Elf::good(&pil).bytes();
+    assert_eq!(Firmware::parse(&file).expect("an image").check_purpose(Kind::Pil, None), Ok(()));
     let newer = Image { interface_version: INTERFACE_VERSION + 1, ..image() };
     assert_eq!(purpose(&newer, None), Err(PurposeError::OtherInterface(INTERFACE_VERSION + 1)));
 }

@@ -558,7 +558,7 @@ fn the_picture_in_the_readme_is_what_is_shown() {
 
 /// The words of a picture, row by row, without numbers, bars and curves.
 fn shape(picture: &str) -> Vec<Vec<String>> {
-    let is_word = |word: &&str| word.starts_with(char::is_alphabetic) && word.chars().all(|c| c.is_ascii());
+    let is_word = |word: &&str| word.starts_with(char::is_alphabetic) && word.is_ascii();
     let row = |row: &str| {
         let words = row.split_whitespace().filter(is_word);
         // What limits a joint comes and goes, and what the link does is the machine's affair.

@@ -2,8 +2,11 @@
 //! gains, limits and faults. What belongs to the hand itself is built in.
 
 use crate::command::Refusal;
+use crate::fault::FrozenConfig;
+use crate::limit::StopConfig;
 use crate::tick::{Config, Params};
 use core::fmt;
+use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
 /// What the index of a parameter counts.
@@ -88,6 +91,22 @@ enum Slot<'a> {
     Whole(&'a mut u32),
 }
 
+impl Slot<'_> {
+    fn put(self, value: f32) -> Result<(), Refusal> {
+        match self {
+            Self::Real(slot) => *slot = value,
+            Self::Whole(slot) => {
+                let whole = value as u32;
+                if whole as f32 != value {
+                    return Err(Refusal::OutOfRange);
+                }
+                *slot = whole;
+            }
+        }
+        Ok(())
+    }
+}
+
 impl<const J: usize, const F: usize> Params<f32, J, F> {
     /// Reads a parameter. Times in ms are whole numbers.
     ///
@@ -111,17 +130,72 @@ impl<const J: usize, const F: usize> Params<f32, J, F> {
             return Err(Refusal::NotFinite);
         }
         let mut config = *self.config();
-        match slot(&mut config, self.hand().joint_count(), parameter, index)? {
-            Slot::Real(slot) => *slot = value,
-            Slot::Whole(slot) => {
-                let whole = value as u32;
-                if whole as f32 != value {
-                    return Err(Refusal::OutOfRange);
-                }
-                *slot = whole;
+        slot(&mut config, self.hand().joint_count(), parameter, index)?.put(value)?;
+        self.configure(&config).map_err(|_| Refusal::OutOfRange)
+    }
+}
+
+impl<const J: usize> Config<f32, J> {
+    /// Puts a parameter in, without looking at the others: [`Params::new`] does. `None` switches off what it belongs to,
+    /// with all its joints and parameters; a value switches it on, with zeros for the rest.
+    ///
+    /// # Errors
+    /// There is no such parameter, it can't be switched off, or it is a whole number and the value is none.
+    pub fn put(
+        &mut self,
+        joint_count: usize,
+        parameter: Parameter,
+        index: u8,
+        value: Option<f32>,
+    ) -> Result<(), Refusal> {
+        self.switch(parameter, value.is_some())?;
+        let Some(value) = value else { return Ok(()) };
+        slot(self, joint_count, parameter, index)?.put(value)
+    }
+
+    /// Switches on, if it is off, or off what a parameter belongs to.
+    fn switch(&mut self, parameter: Parameter, on: bool) -> Result<(), Refusal> {
+        fn turn<T>(switched: &mut Option<T>, on: bool, blank: T) {
+            if on {
+                switched.get_or_insert(blank);
+            } else {
+                *switched = None;
             }
         }
-        self.configure(&config).map_err(|_| Refusal::OutOfRange)
+        let zeros = [0.0; J];
+        let Self { law, limits, faults, .. } = self;
+        match parameter {
+            Parameter::Force
+            | Parameter::AttitudeStiffness
+            | Parameter::Damping
+            | Parameter::EstimatorBandwidth
+            | Parameter::SoftStartTime
+            | Parameter::ReleaseTime => return if on { Ok(()) } else { Err(Refusal::OutOfRange) },
+            Parameter::Gravity => turn(&mut law.gravity_m_s2, on, Vector3::zeros()),
+            Parameter::ForceLimit => turn(&mut limits.force_n, on, 0.0),
+            Parameter::StiffnessLimit => turn(&mut limits.attitude_stiffness_nm, on, 0.0),
+            Parameter::TorqueLimit => turn(&mut limits.torque_nm, on, zeros),
+            Parameter::SlewLimit => turn(&mut limits.slew_nm_s, on, zeros),
+            Parameter::StopMargin | Parameter::StopStiffness | Parameter::StopDamping => {
+                let blank = StopConfig { margin_rad: zeros, stiffness_nm_rad: zeros, damping_nm_s: zeros };
+                turn(&mut limits.stops, on, blank);
+            }
+            Parameter::PossibleSpeed => turn(&mut faults.possible_speed_rad_s, on, zeros),
+            Parameter::SpeedLimit => turn(&mut faults.speed_limit_rad_s, on, zeros),
+            Parameter::RangeSlack => turn(&mut faults.range_slack_rad, on, 0.0),
+            Parameter::SaturatedTime => turn(&mut faults.saturated_ms, on, 0),
+            Parameter::FrozenTorque | Parameter::FrozenNeighbour | Parameter::FrozenTime => {
+                turn(
+                    &mut faults.frozen,
+                    on,
+                    FrozenConfig { torque_nm: zeros, neighbour_rad: 0.0, after_ms: 0 },
+                );
+            }
+            Parameter::HeartbeatTime => turn(&mut faults.heartbeat_ms, on, 0),
+            Parameter::LateTicks => turn(&mut faults.late_ticks, on, 0),
+            Parameter::Energy => turn(&mut faults.energy_j, on, 0.0),
+        }
+        Ok(())
     }
 }
 

@@ -6,6 +6,7 @@ use blindgrasp_shared::fault::{Fault, Raised};
 use blindgrasp_shared::limit::{Limit, Limiting};
 use blindgrasp_shared::link::message::{Reply, Signals};
 use blindgrasp_shared::link::{HearError, Heard, Listener, Receiver, Sender, most_bytes};
+use blindgrasp_shared::math::Real;
 use blindgrasp_shared::supervisor::Mode;
 use blindgrasp_shared::telemetry::dense::{FULL_EVERY_TICKS, TAG, WINDOW, digest, quantised};
 use blindgrasp_shared::telemetry::{List, Record};
@@ -329,7 +330,7 @@ fn a_line_that_loses_nothing_is_heard_whole() {
     let (mut sender, mut listener) = (Sender::new(), Listener::<24>::new());
     for tick in 0..5000_u32 {
         let mut record = record(tick);
-        record.counts = List::first_of([(1000.0 * (f64::from(tick) / 200.0).sin()) as i32; 12], 12);
+        record.counts = List::first_of([(1000.0 * (f64::from(tick) / 200.0).sine_cosine().0) as i32; 12], 12);
         record.torques_nm = List::first_of(
             [f32::NAN, f32::INFINITY, -0.0, 1e30, 1e-30, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0],
             12,

@@ -149,6 +149,14 @@ impl<T: Transport> Conversation<T> {
         }
     }
 
+    /// The payloads of the next frames, as they are.
+    ///
+    /// # Panics
+    /// If they do not come in time.
+    pub fn payloads(&mut self, count: usize) -> Vec<Vec<u8>> {
+        (0..count).map(|_| self.hear(ANSWER).expect("a frame comes").0).collect()
+    }
+
     /// The next record, be it one that was put aside.
     ///
     /// # Panics

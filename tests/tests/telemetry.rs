@@ -13,6 +13,7 @@ use blindgrasp_shared::fault::{Fault, FaultConfig, Raised};
 use blindgrasp_shared::identity::{Clock, Identity, Image, ResetCause, UNITS};
 use blindgrasp_shared::link::message::{Packet, Reply, Request, Signals};
 use blindgrasp_shared::link::{Listener, Receiver, Sender, most_bytes};
+use blindgrasp_shared::math::Real;
 use blindgrasp_shared::supervisor::Mode;
 use blindgrasp_shared::telemetry::burst::Burst;
 use blindgrasp_shared::telemetry::dense::{digest, quantised};
@@ -272,7 +273,7 @@ impl Controller for Line {
         // Somebody shakes the fingers, each joint at its own pace.
         for (k, torque) in torques_nm.iter_mut().enumerate().take(12) {
             let phase = self.tick as f32 * (0.02 + 0.011 * k as f32);
-            *torque += SHAKE_NM * phase.sin();
+            *torque += SHAKE_NM * phase.sine_cosine().0;
         }
         Ok(Stepped {
             torques_nm,
@@ -285,8 +286,8 @@ impl Controller for Line {
     }
 }
 
-/// How hard the fingers are shaken, N m: a tenth of what a joint needs to hold.
-const SHAKE_NM: f32 = 0.02;
+/// How hard the fingers are shaken, N m: five times as much loses the cube.
+const SHAKE_NM: f32 = 0.004;
 
 fn hand_config() -> Config<f32, MAX_JOINTS> {
     let scene = Scene::load("cube", &[]).expect("it is built in");
@@ -316,7 +317,7 @@ fn a_minute_of_a_shaken_grasp_fits_a_line_of_one_megabaud() {
 fn swinging(config: &Config<f32, MAX_JOINTS>, tick: u64, speed_rad_s: f64) -> Reading<MAX_JOINTS> {
     Reading::Counts(std::array::from_fn(|k| {
         let rate_1_s = 100.0 + 31.0 * k as f64;
-        let angle_rad = speed_rad_s / rate_1_s * (rate_1_s * tick as f64 / 1000.0).sin();
+        let angle_rad = speed_rad_s / rate_1_s * (rate_1_s * tick as f64 / 1000.0).sine_cosine().0;
         (angle_rad / f64::from(config.estimator.encoders[k.min(11)].rad_per_count)) as i32
     }))
 }

@@ -70,8 +70,9 @@ mod app {
     /// The control task.
     ///
     /// - **Starts** it: SysTick, every millisecond (the period of the hand's configuration).
-    /// - **Deadline**: the next start. Within it, 12 joints take about 0.25 ms on the buses, the tick about 0.1 ms.
-    ///   Nothing but the interrupt of a received byte gets in between, which takes 3 % of the time at the very most.
+    /// - **Deadline**: the next start. Within it, 12 joints take about 0.36 ms on the buses (reckoned in `board`), the tick
+    ///   about 0.1 ms. Nothing but the interrupt of a received byte gets in between, which takes 3 % of the time at the
+    ///   very most.
     /// - **Late**: the turn is finished, and the next one begins at once; starts beyond that one are lost. The next tick
     ///   is told, counts it, and makes it a fault when there are too many.
     /// - **Never ends**: nobody feeds the watchdog, and the hand is reset.

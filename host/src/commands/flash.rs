@@ -1,6 +1,7 @@
 //! `blindgrasp flash`: firmware onto a microcontroller, over a debug probe.
 
 use super::Outcome;
+use blindgrasp::device::image::Kind;
 use clap::Args;
 use std::path::PathBuf;
 
@@ -14,8 +15,11 @@ use std::path::PathBuf;
 // Without the feature the arguments are read, but nothing is done with them.
 #[cfg_attr(not(feature = "probe"), allow(dead_code))]
 pub(crate) struct Arguments {
-    /// The image, an ELF file [default: the image `hand` that was built last in target/]
+    /// The image, an ELF file [default: the one of its kind that was built last in target/]
     image: Option<PathBuf>,
+    /// Refuse an image that is not of this kind
+    #[arg(long, value_enum, default_value_t = Kind::Hand)]
+    kind: Kind,
     /// Refuse an image that is not for this hand, given by its file
     #[arg(long, value_name = "FILE")]
     hand: Option<PathBuf>,
@@ -66,7 +70,7 @@ mod probe {
     use blindgrasp::device::flash::monitor::{self, Event};
     use blindgrasp::device::flash::probe::{attach, choose, describe};
     use blindgrasp::device::flash::{Chip, Phase, Progress, download};
-    use blindgrasp::device::image::{BUILD_HINT, ExpectedHand, Firmware, Footprint};
+    use blindgrasp::device::image::{BUILD_HINT, ExpectedHand, Firmware, Footprint, Kind};
     use blindgrasp::scene::HandModel;
     use indicatif::{ProgressBar, ProgressStyle};
     use probe_rs::probe::list::Lister;
@@ -113,13 +117,13 @@ mod probe {
     pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
         let path = match &arguments.image {
             Some(path) => path.clone(),
-            None => newest_image()?,
+            None => newest_image(arguments.kind)?,
         };
         let file = read(&path)?;
         let about = || format!("image {}", path.display());
         let firmware = Firmware::parse(&file).with_context(about)?;
         let expected = arguments.hand.as_deref().map(expected_hand).transpose()?;
-        firmware.check_purpose(expected.as_ref()).with_context(about)?;
+        firmware.check_purpose(arguments.kind, expected.as_ref()).with_context(about)?;
         let chip = Chip::by_name(&arguments.chip)?;
         let footprint = chip.check(&firmware).with_context(|| format!("{} on {}", about(), chip.name()))?;
         let follow =
@@ -150,8 +154,8 @@ mod probe {
         Ok(outcome)
     }
 
-    /// The image `hand` that was built last, by either toolchain.
-    fn newest_image() -> anyhow::Result<PathBuf> {
+    /// The image of a kind that was built last, by either toolchain.
+    fn newest_image(kind: Kind) -> anyhow::Result<PathBuf> {
         let here = std::env::current_dir().context("cannot tell the current directory")?;
         let target = match std::env::var_os("CARGO_TARGET_DIR") {
             Some(directory) => here.join(directory),
@@ -160,7 +164,7 @@ mod probe {
             }
         };
         let candidates = [target.clone(), target.join("debian")]
-            .map(|directory| directory.join("thumbv7em-none-eabihf/firmware/hand"));
+            .map(|directory| directory.join("thumbv7em-none-eabihf/firmware").join(kind.name()));
         let built = |path: &PathBuf| fs::metadata(path).and_then(|metadata| metadata.modified()).ok();
         let newest = candidates.iter().filter_map(|path| Some((built(path)?, path))).max();
         let Some((_, path)) = newest else {

@@ -44,7 +44,9 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
     settings.extend(arguments.duration.map(|s| format!("duration_s={s:?}")));
     let scene = Scene::load(&arguments.scene, &settings)?;
     let (directory, recording) = match &arguments.out {
-        Some(path) if path.extension().is_some_and(|extension| extension == "mcap") => (None, Some(path.clone())),
+        Some(path) if path.extension().is_some_and(|extension| extension == "mcap") => {
+            (None, Some(path.clone()))
+        }
         Some(path) => (Some(RunDir::choose(path, arguments.force)?), Some(path.join("record.mcap"))),
         None => (None, None),
     };

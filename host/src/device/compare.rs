@@ -71,34 +71,44 @@ pub struct Comparison {
 
 impl Comparison {
     /// Of a hand with these joints.
-    pub(super) fn new(joint_names: Vec<String>) -> Self {
+    pub(crate) fn new(joint_names: Vec<String>) -> Self {
         Self { joint_names, ..Self::default() }
+    }
+
+    /// From now on it is about a hand with these joints.
+    pub(crate) fn rename(&mut self, joint_names: Vec<String>) {
+        self.joint_names = joint_names;
     }
 
     /// Compares a tick. What only one of the two can know is left out: how long the tick took.
     pub(super) fn add(&mut self, tick: i64, device: &Turned, host: &Turned) {
         let host_record =
             Record { cycles: device.record.cycles, dropped: device.record.dropped, ..host.record.clone() };
-        if same_bits(&device.record, &host_record)
-            && same_answer(device.answer.as_ref(), host.answer.as_ref())
-        {
-            return;
-        }
-        self.torques(tick, &device.record, &host_record);
-        for ((what, device), (_, host)) in words(&device.record).into_iter().zip(words(&host_record)) {
-            if device != host {
-                self.differs(tick, what, None, Value::Words(device), Value::Words(host));
-            }
-        }
-        for ((what, device), (_, host)) in numbers(&device.record).into_iter().zip(numbers(&host_record)) {
-            if device.to_bits() != host.to_bits() {
-                self.differs(tick, what, None, Value::of(device), Value::of(host));
-            }
-        }
+        self.records(tick, &device.record, &host_record);
         if !same_answer(device.answer.as_ref(), host.answer.as_ref()) {
             let (device, host) = (format!("{:?}", device.answer), format!("{:?}", host.answer));
             self.differs(tick, "answer to the request", None, Value::Words(device), Value::Words(host));
         }
+    }
+
+    /// Compares two records, with all that is in them; says whether they are the same.
+    pub(crate) fn records(&mut self, tick: i64, device: &Record, host: &Record) -> bool {
+        if same_bits(device, host) {
+            return true;
+        }
+        let before = self.bits_differ;
+        self.torques(tick, device, host);
+        for ((what, device), (_, host)) in words(device).into_iter().zip(words(host)) {
+            if device != host {
+                self.differs(tick, what, None, Value::Words(device), Value::Words(host));
+            }
+        }
+        for ((what, device), (_, host)) in numbers(device).into_iter().zip(numbers(host)) {
+            if device.to_bits() != host.to_bits() {
+                self.differs(tick, what, None, Value::of(device), Value::of(host));
+            }
+        }
+        self.bits_differ == before
     }
 
     fn torques(&mut self, tick: i64, device: &Record, host: &Record) {
@@ -115,7 +125,15 @@ impl Comparison {
         }
     }
 
-    fn differs(&mut self, tick: i64, what: &'static str, joint: Option<usize>, device: Value, host: Value) {
+    /// Counts a value that differs.
+    pub(crate) fn differs(
+        &mut self,
+        tick: i64,
+        what: &'static str,
+        joint: Option<usize>,
+        device: Value,
+        host: Value,
+    ) {
         self.bits_differ += 1;
         if self.first_difference.is_none() {
             let joint = joint.and_then(|joint| self.joint_names.get(joint)).cloned();
@@ -124,13 +142,19 @@ impl Comparison {
     }
 }
 
-/// Whether two records have the same bytes on the wire, where a float is its bits.
+/// Whether two records are the same, where a float is its bits.
 fn same_bits(a: &Record, b: &Record) -> bool {
-    let (mut buffer_a, mut buffer_b) = ([0; Record::MOST_BYTES], [0; Record::MOST_BYTES]);
-    match (a.encode(&mut buffer_a), b.encode(&mut buffer_b)) {
-        (Ok(a), Ok(b)) => a == b,
-        _ => false,
-    }
+    let whole = |r: &Record| (r.sequence, r.tick, r.mode, r.fault, r.events, r.reading_failed);
+    let counters = |r: &Record| (r.cycles, r.late_ticks, r.dropped, r.decimation);
+    let same =
+        |a: &[f32], b: &[f32]| a.len() == b.len() && a.iter().zip(b).all(|(a, b)| a.to_bits() == b.to_bits());
+    whole(a) == whole(b)
+        && counters(a) == counters(b)
+        && a.answer == b.answer
+        && same(&numbers(a).map(|(_, number)| number), &numbers(b).map(|(_, number)| number))
+        && a.counts == b.counts
+        && same(a.torques_nm.as_slice(), b.torques_nm.as_slice())
+        && a.limiting == b.limiting
 }
 
 /// Who each is, is not compared, only in which session they are.
@@ -143,7 +167,7 @@ fn same_answer(a: Option<&Answer>, b: Option<&Answer>) -> bool {
 }
 
 /// What of a record is not a real number.
-fn words(record: &Record) -> [(&'static str, String); 10] {
+fn words(record: &Record) -> [(&'static str, String); 13] {
     [
         ("mode", record.mode.words().to_owned()),
         ("fault", record.fault.map_or("none".to_owned(), |raised| raised.to_string())),
@@ -152,6 +176,9 @@ fn words(record: &Record) -> [(&'static str, String); 10] {
         ("reading", record.reading_failed.map_or("good".to_owned(), |raised| raised.to_string())),
         ("tick", record.tick.to_string()),
         ("sequence", record.sequence.to_string()),
+        ("cycles", record.cycles.to_string()),
+        ("late ticks", record.late_ticks.to_string()),
+        ("dropped", record.dropped.to_string()),
         ("decimation", record.decimation.to_string()),
         ("counts", format!("{:?}", record.counts)),
         ("limiting", format!("{:?}", record.limiting)),

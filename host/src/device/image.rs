@@ -161,7 +161,7 @@ pub enum ImageError {
 }
 
 /// How to build an image.
-pub const BUILD_HINT: &str = "`tests/firmware-toolchain cargo build -p blindgrasp-firmware --bin hand --profile firmware --target thumbv7em-none-eabihf`";
+pub const BUILD_HINT: &str = "`tests/firmware-toolchain cargo build -p blindgrasp-firmware --profile firmware --target thumbv7em-none-eabihf`";
 
 /// What an ELF file is built for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -256,6 +256,40 @@ pub enum FitError {
     BadResetVector(u64),
 }
 
+/// The images of the firmware.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "command", derive(clap::ValueEnum))]
+pub enum Kind {
+    /// Drives the joints of a hand
+    Hand,
+    /// Processor in the loop: its joints are simulated, at the other end of the line
+    Pil,
+}
+
+impl Kind {
+    /// Its name.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Hand => "hand",
+            Self::Pil => "pil",
+        }
+    }
+
+    /// What it does.
+    const fn words(self) -> &'static str {
+        match self {
+            Self::Hand => "drives the joints of a hand",
+            Self::Pil => "takes its joints from `blindgrasp pil`",
+        }
+    }
+}
+
+impl fmt::Display for Kind {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name())
+    }
+}
+
 /// Why an image, though it is one, is not the right one.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum PurposeError {
@@ -264,14 +298,14 @@ pub enum PurposeError {
         "the image speaks version {0} of the interface, this tool version {INTERFACE_VERSION}; build both from the same sources"
     )]
     OtherInterface(u16),
-    /// It is for emulation.
-    #[error(
-        "this is the image `pil`, for emulation: without a debugger it stops at its first exchange, and it drives no joints; flash the image `hand`"
-    )]
-    Emulation,
-    /// It is of an unknown kind.
-    #[error("this is the image `{0}`; only `hand` can be flashed")]
-    OtherKind(String),
+    /// It is not the image that is wanted.
+    #[error("this is the image `{image}`, not `{wanted}`, which {}", .wanted.words())]
+    OtherKind {
+        /// What it says that it is.
+        image: String,
+        /// What it should be.
+        wanted: Kind,
+    },
     /// It is for another hand.
     #[error(
         "the image is for the hand `{image}`, not for `{expected}`; build it for that hand with the environment variable HAND"
@@ -331,19 +365,17 @@ impl<'a> Firmware<'a> {
             .map(|s| (s.physical_address, s.bytes))
     }
 
-    /// Checks that this is an image that may be flashed, and for the given hand.
+    /// Checks that this is the image that is wanted, and for the given hand.
     ///
     /// # Errors
     /// Why not.
-    pub fn check_purpose(&self, hand: Option<&ExpectedHand>) -> Result<(), PurposeError> {
+    pub fn check_purpose(&self, kind: Kind, hand: Option<&ExpectedHand>) -> Result<(), PurposeError> {
         let image = &self.image;
         if image.interface_version != INTERFACE_VERSION {
             return Err(PurposeError::OtherInterface(image.interface_version));
         }
-        match image.kind {
-            "hand" => {}
-            "pil" => return Err(PurposeError::Emulation),
-            kind => return Err(PurposeError::OtherKind(printable(kind))),
+        if image.kind != kind.name() {
+            return Err(PurposeError::OtherKind { image: printable(image.kind), wanted: kind });
         }
         let Some(hand) = hand else { return Ok(()) };
         if image.hand != hand.name {

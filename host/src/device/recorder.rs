@@ -385,11 +385,10 @@ impl Recorder {
                     }
                 }
             }
-            (Request::Telemetry { .. }, Some(Answer::Done)) => {
-                if self.phase == Phase::Telemetry {
-                    self.phase = Phase::Records;
-                }
+            (Request::Telemetry { .. }, Some(Answer::Done)) if self.phase == Phase::Telemetry => {
+                self.phase = Phase::Records;
             }
+            (Request::Telemetry { .. }, Some(Answer::Done)) => {}
             (Request::GetParameter { .. } | Request::Telemetry { .. }, _) => {
                 self.asked += 1;
                 if self.asked > TRIES * 2 {

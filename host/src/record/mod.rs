@@ -2,6 +2,10 @@
 
 pub mod csv;
 #[cfg(feature = "command")]
+pub mod export;
+#[cfg(feature = "command")]
 pub mod mcap;
+#[cfg(feature = "command")]
+pub mod replay;
 pub mod run_dir;
 pub mod sample;

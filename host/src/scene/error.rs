@@ -86,7 +86,7 @@ impl SceneError {
 }
 
 /// `did you mean ...`, or everything there is.
-pub(super) fn suggestion<'a>(word: &str, known: impl IntoIterator<Item = &'a str>) -> String {
+pub fn suggestion<'a>(word: &str, known: impl IntoIterator<Item = &'a str>) -> String {
     let known: Vec<&str> = known.into_iter().collect();
     let likeness = |candidate: &str| match word.len().max(candidate.len()) {
         0..=LONGEST_WORD => strsim::jaro_winkler(word, candidate),

@@ -38,7 +38,7 @@ use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 use std::path::Path;
 use tree::{Node, Setting};
 
-pub use error::{Place, SceneError};
+pub use error::{Place, SceneError, suggestion};
 pub use file::{Actuators, Control, Friction, HandFile, ObjectFile, PlantSettings, SceneFile, Sensors};
 pub use hand_model::HandModel;
 pub use source::config_source;

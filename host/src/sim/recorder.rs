@@ -16,7 +16,8 @@ use std::path::Path;
 /// Ticks from one snapshot to the next.
 const SNAPSHOT_TICKS: u64 = 1000;
 /// Bytes that suffice for every snapshot.
-const MOST_SNAPSHOT: usize = BYTES_PER_JOINT * if MAX_JOINTS > MAX_FINGERS { MAX_JOINTS } else { MAX_FINGERS };
+const MOST_SNAPSHOT: usize =
+    BYTES_PER_JOINT * if MAX_JOINTS > MAX_FINGERS { MAX_JOINTS } else { MAX_FINGERS };
 
 /// Records a simulation, until something goes wrong.
 pub struct Recorder {
@@ -33,7 +34,12 @@ impl Recorder {
     ///
     /// # Errors
     /// The file can't be made.
-    pub fn create(path: &Path, force: bool, scene: &Scene, controller: &Alone) -> Result<Self, RecordingError> {
+    pub fn create(
+        path: &Path,
+        force: bool,
+        scene: &Scene,
+        controller: &Alone,
+    ) -> Result<Self, RecordingError> {
         // The gains are the scene's, as they were its controller's.
         let hand = HandFile { control: Some(scene.control.clone()), ..scene.file.hand.clone() };
         let mut about = About::of(&Identity {

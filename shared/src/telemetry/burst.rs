@@ -235,3 +235,45 @@ impl<const J: usize> Default for Burst<J> {
         Self::new()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::boxed::Box;
+
+    #[test]
+    fn what_is_kept_is_the_record() {
+        let mut burst = Box::new(Burst::<3>::new());
+        let answers = Refusal::ALL.iter().map(|&refusal| Some(refusal)).chain([None]);
+        let answers =
+            answers.flat_map(|refused| Command::ALL.map(|command| Some(Answer { command, refused })));
+        let records: std::vec::Vec<_> = answers
+            .chain([None])
+            .cycle()
+            .zip(0..)
+            .take(AFTER)
+            .map(|(answer, tick)| Record {
+                sequence: tick,
+                tick,
+                mode: Mode::Fault,
+                answer,
+                fault: Fault::ALL.get(tick as usize % 20).map(|&fault| Raised::at(tick as usize % 3, fault)),
+                reading_failed: (tick % 2 == 0).then_some(Raised::of_hand(Fault::OutputFailed)),
+                force_n: 5.0,
+                energy_j: -1e-9,
+                cycles: 123,
+                late_ticks: 4,
+                dropped: 5,
+                decimation: 1,
+                counts: List::first_of([1, -2, i32::MIN], 3),
+                torques_nm: List::first_of([0.5, -0.0, f32::INFINITY], 3),
+                ..Record::BLANK
+            })
+            .collect();
+        records.iter().for_each(|record| burst.take(record));
+        for (record, index) in records.into_iter().zip(0..) {
+            assert_eq!(burst.get(index), Caught::Record { count: AFTER as u16, record });
+        }
+        assert_eq!(burst.get(AFTER as u16), Caught::NoSuchRecord);
+    }
+}

@@ -256,7 +256,9 @@ impl Track {
             return;
         }
         let (Some(config), Some(about)) = (&self.config, &self.about) else { return };
-        let Ok(period) = Period::from_us(config.period_us.saturating_mul(every.max(1).into())) else { return };
+        let Ok(period) = Period::from_us(config.period_us.saturating_mul(every.max(1).into())) else {
+            return;
+        };
         let mut estimator = config.estimator;
         let highest_hz = 1.0 / (PI * period.seconds::<f32>());
         // Just below, so that rounding does not put it above.

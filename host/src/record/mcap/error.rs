@@ -64,7 +64,9 @@ pub enum RecordingError {
         ours: u32,
     },
     /// Records of another interface version.
-    #[error("device `{device}` was recorded with interface version {theirs}, and this program has {INTERFACE_VERSION}: its raw records can't be decoded; the decoded signals in the file can still be read with MCAP tools, or use the program that recorded it ({program})")]
+    #[error(
+        "device `{device}` was recorded with interface version {theirs}, and this program has {INTERFACE_VERSION}: its raw records can't be decoded; the decoded signals in the file can still be read with MCAP tools, or use the program that recorded it ({program})"
+    )]
     OtherInterface {
         /// The device.
         device: String,

@@ -122,7 +122,10 @@ impl Kind {
 
 /// CRC-32 of metadata: MCAP has none for it.
 fn seal(metadata: &BTreeMap<String, String>) -> String {
-    let text: String =
-        metadata.iter().filter(|(key, _)| *key != "crc").map(|(key, value)| format!("{key}={value}\n")).collect();
+    let text: String = metadata
+        .iter()
+        .filter(|(key, _)| *key != "crc")
+        .map(|(key, value)| format!("{key}={value}\n"))
+        .collect();
     format!("{:08x}", crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC).checksum(text.as_bytes()))
 }

@@ -72,7 +72,7 @@ pub enum What {
 pub struct Recording {
     path: PathBuf,
     library: String,
-    devices: Vec<String>,
+    channels: Channels,
     span: Option<(Stamp, Stamp)>,
     summary: Option<Summary>,
     ticks: bool,
@@ -143,12 +143,12 @@ impl Recording {
             Some(span) => Some(span),
             None => span_of_chunks(&mut file).map_err(unreadable)?,
         };
-        Ok(Self { path: path.into(), library, devices: channels.names, span, summary, ticks: false })
+        Ok(Self { path: path.into(), library, channels, span, summary, ticks: false })
     }
 
     /// Names of the devices; [`Entry::device`] counts them.
     pub fn devices(&self) -> &[String] {
-        &self.devices
+        &self.channels.names
     }
 
     /// What wrote it.
@@ -189,13 +189,11 @@ impl Recording {
     pub fn entries(&self) -> Result<Entries, RecordingError> {
         let unreadable = |source| RecordingError::Io { action: "read", path: self.path.clone(), source };
         let pieces = File::open(&self.path).and_then(Pieces::new).map_err(unreadable)?;
-        let fixed = self.library == LIBRARY;
-        let channels = Channels { names: self.devices.clone(), fixed, ..Channels::default() };
         Ok(Entries {
             path: self.path.clone(),
             pieces,
-            channels,
-            expected: self.summary.as_ref().map(|summary| summary.counts.clone()).unwrap_or_default(),
+            channels: self.channels.clone(),
+            expected: self.summary.as_ref().map(|summary| summary.counts.clone()),
             next: HashMap::new(),
             waiting: VecDeque::new(),
             ticks: self.ticks,
@@ -257,8 +255,8 @@ pub struct Entries {
     path: PathBuf,
     pieces: Pieces,
     channels: Channels,
-    /// Messages a channel has, as the summary says.
-    expected: HashMap<u16, u64>,
+    /// Messages a channel has, as the summary says, if there is one.
+    expected: Option<HashMap<u16, u64>>,
     /// Number of each channel's next message.
     next: HashMap<u16, u32>,
     waiting: VecDeque<Entry>,
@@ -331,7 +329,11 @@ impl Entries {
 
     /// What is missing at the end, where the summary tells how much there was.
     fn count_end(&mut self) {
-        for (&channel, &expected) in &self.expected {
+        let Some(expected) = &self.expected else {
+            self.pieces.damage_mut().unfinished = true;
+            return;
+        };
+        for (&channel, &expected) in expected {
             let is_told = |(_, kind)| kind != Kind::Tick || self.ticks;
             if self.channels.of(channel).is_some_and(is_told) {
                 let came = self.next.get(&channel).copied().unwrap_or(0);
@@ -441,9 +443,7 @@ impl Summary {
             match kind {
                 op::CHANNEL => summary.channels.push(content.to_vec()),
                 op::STATISTICS => {
-                    let number = |at: usize| {
-                        content.get(at..at + 8)?.try_into().ok().map(u64::from_le_bytes)
-                    };
+                    let number = |at: usize| content.get(at..at + 8)?.try_into().ok().map(u64::from_le_bytes);
                     // Messages, schemas, channels, attachments, metadata, chunks; then the times, and a map's length.
                     let (messages, first, last) = (number(0)?, number(26)?, number(34)?);
                     summary.span = (messages > 0).then_some((Stamp(first), Stamp(last)));

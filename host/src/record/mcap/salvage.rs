@@ -228,7 +228,8 @@ impl Pieces {
         self.go(self.at)?;
         self.file.read_exact(&mut head)?;
         let kind = head[0];
-        let length = u64::from_le_bytes([head[1], head[2], head[3], head[4], head[5], head[6], head[7], head[8]]);
+        let length =
+            u64::from_le_bytes([head[1], head[2], head[3], head[4], head[5], head[6], head[7], head[8]]);
         if !(1..=op::DATA_END).contains(&kind) {
             return Ok(Found::Damage("no record of MCAP begins here"));
         }
@@ -258,7 +259,9 @@ impl Pieces {
                 self.trusted = self.at;
                 if self.at < self.length {
                     self.damage.unfinished = true;
-                    return Ok(Found::Damage("something is behind the end: a program was killed while it wrote"));
+                    return Ok(Found::Damage(
+                        "something is behind the end: a program was killed while it wrote",
+                    ));
                 }
                 self.ended = true;
                 return Ok(Found::Nothing);

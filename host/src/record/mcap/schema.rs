@@ -8,8 +8,8 @@ use blindgrasp_shared::supervisor::Mode;
 use prost::Message;
 use prost_types::field_descriptor_proto::{Label, Type};
 use prost_types::{
-    DescriptorProto, EnumDescriptorProto, EnumValueDescriptorProto, FieldDescriptorProto, FileDescriptorProto,
-    FileDescriptorSet,
+    DescriptorProto, EnumDescriptorProto, EnumValueDescriptorProto, FieldDescriptorProto,
+    FileDescriptorProto, FileDescriptorSet,
 };
 use serde_json::{Value, json};
 
@@ -155,7 +155,8 @@ pub(super) fn of_hand(hand: &str, joint_names: &[String]) -> (String, Vec<u8>) {
         })
         .collect();
     let modes = Mode::ALL.iter().map(|mode| (mode.words().to_uppercase(), *mode as i32));
-    let faults = Fault::ALL.iter().map(|fault| (upper_case(&format!("{fault:?}")), i32::from(fault.number())));
+    let faults =
+        Fault::ALL.iter().map(|fault| (upper_case(&format!("{fault:?}")), i32::from(fault.number())));
     let tick = DescriptorProto {
         nested_type: vec![joint_message, message("Joints", joints)],
         enum_type: vec![
@@ -180,12 +181,14 @@ pub(super) fn of_log() -> Vec<u8> {
         name: Some("google/protobuf/timestamp.proto".into()),
         ..file(
             "google.protobuf",
-            vec![message("Timestamp", vec![field("seconds", 1, Type::Int64), field("nanos", 2, Type::Int32)])],
+            vec![message(
+                "Timestamp",
+                vec![field("seconds", 1, Type::Int64), field("nanos", 2, Type::Int32)],
+            )],
         )
     };
     let levels = ["UNKNOWN", "DEBUG", "INFO", "WARNING", "ERROR", "FATAL"];
-    let typed =
-        |field, name: &str| FieldDescriptorProto { type_name: Some(name.into()), ..field };
+    let typed = |field, name: &str| FieldDescriptorProto { type_name: Some(name.into()), ..field };
     let log = DescriptorProto {
         enum_type: vec![enumeration("Level", levels.iter().map(|&name| name.to_owned()).zip(0..))],
         ..message(

@@ -45,7 +45,6 @@ impl fmt::Display for Saved {
 }
 
 /// What went wrong, for good.
-#[derive(Debug)]
 struct Failure {
     problem: String,
 }
@@ -207,18 +206,23 @@ impl Writer {
         if let Some(crash) = &about.crash {
             self.log(device, at, Level::Error, "session", &format!("the device crashed before: {crash}"))?;
         }
-        Ok(())
+        self.settle(at)
     }
 
     /// The parameters in force: all of them at the beginning of a session, changed ones later.
     ///
     /// # Errors
     /// The recording has stopped.
-    pub fn parameters(&mut self, device: Device, at: Stamp, values: &[Setting]) -> Result<(), RecordingError> {
+    pub fn parameters(
+        &mut self,
+        device: Device,
+        at: Stamp,
+        values: &[Setting],
+    ) -> Result<(), RecordingError> {
         let json = Setting::to_json(values).to_string();
         self.write(device, Kind::Parameters, at, json.as_bytes())?;
         self.devices[device.0].track.parameters(values);
-        Ok(())
+        self.settle(at)
     }
 
     /// The payload of a frame that was sent.
@@ -226,7 +230,8 @@ impl Writer {
     /// # Errors
     /// The recording has stopped.
     pub fn sent(&mut self, device: Device, at: Stamp, payload: &[u8]) -> Result<(), RecordingError> {
-        self.write(device, Kind::Sent, at, payload)
+        self.write(device, Kind::Sent, at, payload)?;
+        self.settle(at)
     }
 
     /// The payload of a good frame that came. A record is written decoded, too; so is, as an event, what it tells of mode,
@@ -246,6 +251,7 @@ impl Writer {
             Arrival::Reply => {}
             Arrival::Unusable => recorded.status.unusable += 1,
         }
+        self.settle(at)?;
         Ok(arrival)
     }
 
@@ -306,8 +312,15 @@ impl Writer {
     ///
     /// # Errors
     /// The recording has stopped.
-    pub fn event(&mut self, device: Device, at: Stamp, level: Level, words: &str) -> Result<(), RecordingError> {
-        self.log(device, at, level, "event", words)
+    pub fn event(
+        &mut self,
+        device: Device,
+        at: Stamp,
+        level: Level,
+        words: &str,
+    ) -> Result<(), RecordingError> {
+        self.log(device, at, level, "event", words)?;
+        self.settle(at)
     }
 
     /// The link was cut. What comes after has no connexion with what came before.
@@ -318,7 +331,8 @@ impl Writer {
         let recorded = &mut self.devices[device.0];
         recorded.track.restart();
         (recorded.mode, recorded.fault, recorded.dropped) = (None, None, None);
-        self.log(device, at, Level::Warning, GAP, words)
+        self.log(device, at, Level::Warning, GAP, words)?;
+        self.settle(at)
     }
 
     /// Writes and returns what became of the link since the last time; meant for every second.
@@ -331,8 +345,7 @@ impl Writer {
         let since = recorded.status_at.replace(at).unwrap_or(at);
         status.seconds_s = at.0.saturating_sub(since.0) as f64 / 1e9;
         status.decimation = recorded.decimation.into();
-        status.rate_hz =
-            if status.seconds_s > 0.0 { status.records as f64 / status.seconds_s } else { 0.0 };
+        status.rate_hz = if status.seconds_s > 0.0 { status.records as f64 / status.seconds_s } else { 0.0 };
         status.share = match recorded.baud {
             Some(baud) if status.seconds_s > 0.0 => {
                 BITS_A_BYTE * status.bytes as f64 / (f64::from(baud) * status.seconds_s)
@@ -340,6 +353,7 @@ impl Writer {
             _ => f64::NAN,
         };
         self.write(device, Kind::Link, at, &status.encode_to_vec())?;
+        self.settle(at)?;
         Ok(status)
     }
 
@@ -432,9 +446,13 @@ impl Writer {
         if !self.devices[device.0].announced {
             self.announce()?;
         }
-        self.write_to(kind.channel(device), at, data)?;
-        let due = self.since.get_or_insert(at);
-        if at.0.saturating_sub(due.0) >= CHECKPOINT_NS || self.pending >= CHECKPOINT_BYTES {
+        self.write_to(kind.channel(device), at, data)
+    }
+
+    /// Makes a checkpoint if it is time: between entries, never within what belongs together.
+    fn settle(&mut self, at: Stamp) -> Result<(), RecordingError> {
+        let since = self.since.get_or_insert(at);
+        if at.0.saturating_sub(since.0) >= CHECKPOINT_NS || self.pending >= CHECKPOINT_BYTES {
             self.checkpoint()?;
         }
         Ok(())
@@ -442,8 +460,7 @@ impl Writer {
 
     fn write_to(&mut self, channel_id: u16, at: Stamp, data: &[u8]) -> Result<(), RecordingError> {
         let sequence = self.counts.entry(channel_id).or_insert(0);
-        let header =
-            MessageHeader { channel_id, sequence: *sequence, log_time: at.0, publish_time: at.0 };
+        let header = MessageHeader { channel_id, sequence: *sequence, log_time: at.0, publish_time: at.0 };
         *sequence = sequence.wrapping_add(1);
         self.mcap()?.write_to_known_channel(&header, data)?;
         self.pending += data.len();
@@ -466,7 +483,9 @@ impl Writer {
                 let (schema, encoding) = match kind {
                     Kind::Received | Kind::Sent => (0, PROFILE),
                     Kind::Event => (mcap.add_schema(schema::LOG, "protobuf", &schema::of_log())?, "protobuf"),
-                    Kind::Link => (mcap.add_schema(schema::LINK, "protobuf", &schema::of_link())?, "protobuf"),
+                    Kind::Link => {
+                        (mcap.add_schema(schema::LINK, "protobuf", &schema::of_link())?, "protobuf")
+                    }
                     Kind::About => {
                         let schema = schema::of_about().to_string();
                         (mcap.add_schema("blindgrasp.About", "jsonschema", schema.as_bytes())?, "json")
@@ -478,7 +497,13 @@ impl Writer {
                     Kind::Tick => continue,
                 };
                 let topic = kind.topic(&name);
-                mcap.add_channel_with_id(kind.channel(Device(k)), schema, &topic, encoding, &BTreeMap::new())?;
+                mcap.add_channel_with_id(
+                    kind.channel(Device(k)),
+                    schema,
+                    &topic,
+                    encoding,
+                    &BTreeMap::new(),
+                )?;
             }
         }
         Ok(())
@@ -512,7 +537,8 @@ impl Writer {
         match mcap.add_channel_with_id(wanted, schema, &topic, "protobuf", &none) {
             // The device had another hand before.
             Err(::mcap::McapError::ConflictingChannels(_)) => {
-                let channel = mcap.add_channel_with_id(u16::MAX - extra, schema, &topic, "protobuf", &none)?;
+                let channel =
+                    mcap.add_channel_with_id(u16::MAX - extra, schema, &topic, "protobuf", &none)?;
                 self.extra_channels += 1;
                 Ok(channel)
             }

@@ -1,0 +1,1200 @@
+#!/usr/bin/env python3
+"""A client of a blindgrasp hand, in the standard library of Python 3.9, written from docs/protocol.md alone.
+
+    blindgrasp_client.py info   --port /dev/ttyUSB0
+    blindgrasp_client.py grasp  --port /dev/ttyUSB0 --force 3 --hold 5 --csv > grasp.csv
+    blindgrasp_client.py pil    --image pil.elf          # joints for the firmware in QEMU, in lockstep
+    blindgrasp_client.py --self-test tests/data/wire/vectors.json
+
+A port is a serial port or pseudo-terminal (1 Mbaud), `unix:PATH` (a socket) or `pipes:IN,OUT` (two named pipes, the one to
+read from first). Numbers of sections are those of docs/protocol.md. Results are on the standard output, everything else on
+the standard error. Exit codes: 0 done; 1 refused, a fault, no answer; 2 bad input or usage.
+
+It is also a module: Frames (section 1), the message types (sections 2 to 4), Replies (with dense records, section 6) and
+Session (section 5) stand on their own, each on those before it.
+"""
+
+import argparse
+import errno
+import json
+import math
+import os
+import select
+import shutil
+import socket
+import struct
+import subprocess
+import sys
+import tempfile
+import time
+import zlib
+
+INTERFACE_VERSION = 3
+HEARTBEAT_S = 0.05  # a fifth of the 250 ms after which a hand lets go
+PATIENCE_S = 1.0  # an answer takes a few ms
+WAITING_MOST = 5  # requests that wait for their answers; the hand holds 7
+
+
+class Trouble(Exception):
+    """What went wrong, in words; ends the program with exit code 1."""
+
+
+class BadInput(Exception):
+    """What the user got wrong; exit code 2."""
+
+
+# ---------------------------------------------------------------------------------------------------- 1. Frames
+
+
+def crc(payload):
+    return zlib.crc32(b"blindgrasp" + payload)
+
+
+def encode_frame(payload):
+    """A payload with its CRC, stuffed, and the 0x00 at its end."""
+    frame = bytearray()
+    data = payload + struct.pack("<I", crc(payload))
+    blocks = data.split(b"\0")
+    for number, block in enumerate(blocks):
+        while len(block) > 254 or (len(block) == 254 and number + 1 < len(blocks)):
+            frame += b"\xff" + block[:254]
+            block = block[254:]
+        frame += bytes([len(block) + 1]) + block
+    return bytes(frame) + b"\0"
+
+
+class DamagedFrame(Exception):
+    """TooShort, TooLong, BadCode or BadCrc."""
+
+
+def decode_frame(stuffed, longest=None):
+    """The payload of what stands before a 0x00."""
+    data, at = bytearray(), 0
+    while at < len(stuffed):
+        code = stuffed[at]
+        data += stuffed[at + 1 : at + code]
+        at += code
+        if at < len(stuffed) and code != 255:
+            data.append(0)
+    if longest is not None and len(data) > longest + 4:
+        raise DamagedFrame("TooLong")
+    if at > len(stuffed):
+        raise DamagedFrame("BadCode")
+    if len(data) < 4:
+        raise DamagedFrame("TooShort")
+    payload = bytes(data[:-4])
+    if struct.pack("<I", crc(payload)) != data[-4:]:
+        raise DamagedFrame("BadCrc")
+    return payload
+
+
+class Frames:
+    """Bytes of a line to payloads."""
+
+    LONGEST = 4096  # far more than any reply; a line without a 0x00 must not fill the memory
+
+    def __init__(self):
+        self.rest = b""
+        self.good = 0
+        self.damaged = 0
+
+    def push(self, received):
+        """The payloads of the frames that these bytes complete."""
+        *frames, self.rest = (self.rest + received).split(b"\0")
+        # What is too long already stays too long, whatever follows.
+        self.rest = self.rest[: 2 * self.LONGEST]
+        payloads = []
+        for frame in filter(None, frames):
+            try:
+                payloads.append(decode_frame(frame, self.LONGEST))
+                self.good += 1
+            except DamagedFrame:
+                self.damaged += 1
+        return payloads
+
+
+# ---------------------------------------------------------------------------------------- 2. Types and their bytes
+
+
+class Malformed(Exception):
+    """Bytes that are not what they should be."""
+
+
+class Reader:
+    """Bytes that are taken from the front."""
+
+    def __init__(self, data):
+        self.data, self.at = data, 0
+
+    def take(self, count):
+        taken = self.data[self.at : self.at + count]
+        if len(taken) < count:
+            raise Malformed("the bytes end too early")
+        self.at += count
+        return taken
+
+    def varint(self, bits):
+        value = 0
+        for shift in range(0, bits, 7):
+            byte = self.take(1)[0]
+            value |= (byte & 0x7F) << shift
+            if byte < 0x80:
+                if value >> bits:
+                    break
+                return value
+        raise Malformed(f"a number of more than {bits} bits")
+
+
+def varint(value, bits):
+    if not 0 <= value < 1 << bits:
+        raise Malformed(f"{value} is no number of {bits} bits")
+    out = bytearray()
+    while value > 0x7F:
+        out.append(value & 0x7F | 0x80)
+        value >>= 7
+    return bytes(out) + bytes([value])
+
+
+class Type:
+    """A type: values to bytes and back."""
+
+    def decode(self, payload):
+        reader = Reader(payload)
+        value = self.read(reader)
+        if reader.at < len(payload):
+            raise Malformed("there are bytes after the message")
+        return value
+
+
+class Fixed(Type):
+    """Bytes of a fixed number, as the module `struct` names them."""
+
+    def __init__(self, code):
+        self.struct = struct.Struct("<" + code)
+
+    def read(self, reader):
+        return self.struct.unpack(reader.take(self.struct.size))[0]
+
+    def encode(self, value):
+        return self.struct.pack(value)
+
+
+class Unsigned(Type):
+    def __init__(self, bits):
+        self.bits = bits
+
+    def read(self, reader):
+        return reader.varint(self.bits)
+
+    def encode(self, value):
+        return varint(value, self.bits)
+
+
+class Signed(Unsigned):
+    """Zigzag: 0, -1, 1, -2, ... are 0, 1, 2, 3, ..."""
+
+    def read(self, reader):
+        value = reader.varint(self.bits)
+        return value >> 1 ^ -(value & 1)
+
+    def encode(self, value):
+        return varint(value << 1 if value >= 0 else ~value << 1 | 1, self.bits)
+
+
+class Bool(Type):
+    def read(self, reader):
+        byte = reader.take(1)[0]
+        if byte > 1:
+            raise Malformed(f"{byte} is neither false nor true")
+        return byte == 1
+
+    def encode(self, value):
+        return bytes([value])
+
+
+class Text(Type):
+    def read(self, reader):
+        try:
+            return reader.take(reader.varint(32)).decode()
+        except UnicodeDecodeError:
+            raise Malformed("a text that is not UTF-8") from None
+
+    def encode(self, value):
+        return varint(len(value.encode()), 32) + value.encode()
+
+
+class Option(Type):
+    def __init__(self, item):
+        self.item = item
+
+    def read(self, reader):
+        return self.item.read(reader) if BOOL.read(reader) else None
+
+    def encode(self, value):
+        return b"\0" if value is None else b"\1" + self.item.encode(value)
+
+
+class List(Type):
+    def __init__(self, item):
+        self.item = item
+
+    def read(self, reader):
+        return [self.item.read(reader) for _ in range(min(reader.varint(32), len(reader.data) + 1))]
+
+    def encode(self, value):
+        return varint(len(value), 32) + b"".join(map(self.item.encode, value))
+
+
+class Struct(Type):
+    """Fields in their order; the value is a dict."""
+
+    def __init__(self, **fields):
+        self.fields = fields
+
+    def read(self, reader):
+        return {name: field.read(reader) for name, field in self.fields.items()}
+
+    def encode(self, value):
+        return b"".join(field.encode(value[name]) for name, field in self.fields.items())
+
+
+class Enum(Type):
+    """One of several: a number, and what belongs to it. The value is the name, or {name: what belongs to it}."""
+
+    def __init__(self, *names, **variants):
+        self.variants = [(name, None) for name in names] + list(variants.items())
+
+    def read(self, reader):
+        number = reader.varint(32)
+        if number >= len(self.variants):
+            raise Malformed(f"{number} where there are only {len(self.variants)}")
+        name, body = self.variants[number]
+        return name if body is None else {name: body.read(reader)}
+
+    def encode(self, value):
+        name = value if isinstance(value, str) else next(iter(value))
+        number = [variant for variant, _ in self.variants].index(name)
+        body = self.variants[number][1]
+        return varint(number, 32) + (b"" if body is None else body.encode(value[name]))
+
+
+class Known(Type):
+    """A byte of which not every value means something."""
+
+    def __init__(self, values):
+        self.values = values
+
+    def read(self, reader):
+        byte = reader.take(1)[0]
+        if byte not in self.values:
+            raise Malformed(f"the unknown number {byte}")
+        return byte
+
+    def encode(self, value):
+        return bytes([value])
+
+
+BYTE, F32, BOOL, TEXT = Fixed("B"), Fixed("f"), Bool(), Text()
+U16, U32, I32 = Unsigned(16), Unsigned(32), Signed(32)
+
+# --------------------------------------------------------------------------------------------------- 3. Vocabulary
+
+FAULTS = {
+    1: "encoder gave no sample",
+    2: "angle, speed or torque is not a finite number",
+    3: "count changed by more than the joint can turn in a tick",
+    4: "angle is beyond its range",
+    5: "speed is above its limit",
+    6: "torque stayed at its limit for too long",
+    7: "count stands still although torque and neighbours changed",
+    8: "encoder lost its settings",
+    9: "amplifier's output does not answer",
+    10: "heartbeat of the host stopped",
+    11: "tick was late too often",
+    12: "joints put more energy into the world than they may",
+}
+
+REFUSALS = {
+    "NotArmed": "the hand is disarmed: arm it first",
+    "NotGrasping": "there is no grasp to release",
+    "Grasping": "a grasp is under way: release it first, or stop",
+    "Releasing": "a release is under way: wait for its end, or stop",
+    "InFault": "the hand is in a fault: clear it first",
+    "NoFault": "there is no fault to clear",
+    "FaultPersists": "the cause of the fault is still there: remove it first",
+    "NoHeartbeat": "there is no heartbeat: send it all the time while the hand is armed",
+    "FallbackClock": "the crystal did not start, so that the tick has no exact time: repair the board",
+    "NotFinite": "a value is not a finite number",
+    "OutOfRange": "a value is out of its range: the limits are parameters",
+    "NotDisarmed": "parameters are set while the hand is disarmed: disarm it, or clear its fault, first",
+    "NoSuchParameter": "this hand has no parameter with this index",
+    "SwitchedOff": "this limit is switched off in the hand's configuration",
+    "NoSession": "there is no session of this number: say hello first",
+    "OutOfOrder": "this request, or a later one, was taken before: number them upwards",
+    "OtherInterface": "this firmware has another interface version: use the tool that belongs to it",
+    "NotUnderstood": "this is no request of this interface version",
+    "Busy": "too many requests are waiting: wait for the answers",
+    "JointsAreReal": "this image has real joints: only the image `pil` takes them over the link",
+    "NoBurst": "no fault was caught since the hand was last armed",
+    "BurstNotOver": "the records after the fault are still being taken: ask again in a moment",
+}
+
+# Name on the wire, and the key that users know it by.
+PARAMETERS = {
+    "Force": "force_n",
+    "AttitudeStiffness": "attitude_stiffness_nm",
+    "Damping": "damping_nm_s",
+    "Gravity": "gravity_m_s2",
+    "EstimatorBandwidth": "estimator.bandwidth_hz",
+    "ForceLimit": "limits.force_n",
+    "StiffnessLimit": "limits.attitude_stiffness_nm",
+    "TorqueLimit": "limits.torque_nm",
+    "SlewLimit": "limits.slew_nm_s",
+    "StopMargin": "limits.stops.margin_rad",
+    "StopStiffness": "limits.stops.stiffness_nm_rad",
+    "StopDamping": "limits.stops.damping_nm_s",
+    "PossibleSpeed": "faults.possible_speed_rad_s",
+    "SpeedLimit": "faults.speed_limit_rad_s",
+    "RangeSlack": "faults.range_slack_rad",
+    "SaturatedTime": "faults.saturated_ms",
+    "FrozenTorque": "faults.frozen_torque_nm",
+    "FrozenNeighbour": "faults.frozen_neighbour_rad",
+    "FrozenTime": "faults.frozen_ms",
+    "HeartbeatTime": "faults.heartbeat_ms",
+    "LateTicks": "faults.late_ticks",
+    "Energy": "faults.energy_j",
+    "SoftStartTime": "supervisor.soft_start_ms",
+    "ReleaseTime": "supervisor.release_ms",
+}
+
+MODES = ["Disarmed", "Armed", "Grasping", "Releasing", "Fault"]
+HEARTBEAT, LATE, FALLBACK_CLOCK = 1, 2, 4  # events
+COUNTS, TORQUES, LIMITING, DENSE, STATE = 1, 2, 4, 8, 16  # signals
+
+# ----------------------------------------------------------------------------------------------------- 4. Messages
+
+PARAMETER = Enum(*PARAMETERS)
+REFUSAL = Enum(*REFUSALS)
+FAULT = Struct(fault=Known(FAULTS), joint=Option(BYTE))
+COMMAND = Enum(
+    Arm=None,
+    Disarm=None,
+    Grasp=Struct(force_n=Option(F32), attitude_stiffness_nm=Option(F32)),
+    Release=None,
+    Stop=None,
+    ClearFault=None,
+)
+PACKET = Struct(
+    session=U16,
+    sequence=U16,
+    request=Enum(
+        Hello=Struct(interface_version=U16),
+        Command=COMMAND,
+        Heartbeat=None,
+        SetParameter=Struct(parameter=PARAMETER, index=BYTE, value=F32),
+        GetParameter=Struct(parameter=PARAMETER, index=BYTE),
+        Telemetry=Struct(decimation=U16, signals=BYTE),
+        Joints=Struct(counts=List(I32), failed=Option(FAULT), late=BOOL),
+        Burst=Struct(index=U16),
+    ),
+)
+RECORD = Struct(
+    sequence=U32,
+    tick=U32,
+    mode=Enum(*MODES),
+    fault=Option(FAULT),
+    answer=Option(Struct(command=COMMAND, refused=Option(REFUSAL))),
+    events=BYTE,
+    reading_failed=Option(FAULT),
+    force_n=F32,
+    attitude_stiffness_nm=F32,
+    approach_potential_j=F32,
+    attitude_potential_j=F32,
+    energy_j=F32,
+    cycles=U32,
+    late_ticks=U32,
+    dropped=U32,
+    decimation=U16,
+    counts=List(I32),
+    torques_nm=List(F32),
+    limiting=List(BYTE),
+)
+IDENTITY = Struct(
+    image=Struct(
+        interface_version=U16,
+        kind=TEXT,
+        hand=TEXT,
+        hand_hash=U32,
+        firmware_version=TEXT,
+        build_hash=U32,
+        joint_count=BYTE,
+        fingertip_count=BYTE,
+        period_us=U32,
+    ),
+    units=TEXT,
+    clock=Enum("External", "Fallback", "Emulated"),
+    reset=Enum(
+        "PowerOn", "BrownOut", "Pin", "Software", "IndependentWatchdog", "WindowWatchdog", "LowPower", "Unknown"
+    ),
+    crash=Option(
+        Struct(
+            kind=Enum("Panic", "HardFault"), program_counter=U32, link_register=U32, line=U32, file_hash=U32
+        )
+    ),
+)
+REPLY = Enum(
+    Identity=Struct(sequence=U16, session=U16, identity=IDENTITY),
+    Answer=Struct(sequence=U16, refused=Option(REFUSAL)),
+    Value=Struct(sequence=U16, parameter=PARAMETER, index=BYTE, value=F32),
+    Record=RECORD,
+    Burst=Struct(sequence=U16, index=U16, count=U16, record=RECORD),
+    Snapshot=Struct(tick=U32, offset=U16, length=U16, bytes=List(BYTE)),
+)
+# What every version begins an identity with.
+ANY_IDENTITY = Struct(reply=Known([0]), sequence=U16, session=U16, interface_version=U16)
+
+
+class Refused(Trouble):
+    """A request that was refused, and why."""
+
+    def __init__(self, request, refusal):
+        name = request if isinstance(request, str) else next(iter(request))
+        command = request["Command"] if name == "Command" else name
+        told = command if isinstance(command, str) else next(iter(command))
+        super().__init__(f"{told} is refused: {REFUSALS[refusal]}")
+        self.refusal = refusal
+
+
+def told_fault(raised):
+    joint = "" if raised["joint"] is None else f"joint {raised['joint']}: "
+    return f"fault {raised['fault']}: {joint}{FAULTS[raised['fault']]}"
+
+
+# ----------------------------------------------------------------------------------------- 6. Replies, dense records
+
+
+class Unusable(Exception):
+    """NoFullRecord: a dense record before a full one. Lost: more was lost than a dense record can make up for."""
+
+
+DENSE_TAG = 6
+WINDOW = 8  # a dense record can be read after any of so many before it
+MONITORS = ["force_n", "attitude_stiffness_nm", "approach_potential_j", "attitude_potential_j", "energy_j"]
+
+
+def mix(words):
+    """The hash of dense records."""
+    value = 0
+    for word in words:
+        value = ((value << 5 | value >> 27) & 0xFFFFFFFF ^ word & 0xFFFFFFFF) * 0x9E3779B9 & 0xFFFFFFFF
+    return value
+
+
+def not_below(last, low, bits):
+    """The least number that is not below `last` and has these low bits, modulo 2^32."""
+    return (last + (low - last) % (1 << bits)) % 2**32
+
+
+def nearest(last, low, bits):
+    """The number nearest to `last` with these low bits, in 32 bits with a sign."""
+    half = 1 << (bits - 1)
+    return (last + (low - last + half) % (1 << bits) - half + 2**31) % 2**32 - 2**31
+
+
+def nibbles(packed, size, count):
+    """Numbers of `size` half bytes, the lowest first."""
+    whole = int.from_bytes(packed, "little")
+    return [whole >> 4 * size * k & (1 << 4 * size) - 1 for k in range(count)]
+
+
+class Replies:
+    """Payloads to replies; dense records come out as records."""
+
+    def __init__(self):
+        self.last = None  # the record before
+        self.counts = (0, [])  # the last ones known, and in which record they were
+        self.lost = False  # only a full record helps
+
+    def decode(self, payload):
+        """A reply, and the digest of a dense record (None for all others)."""
+        if payload[:1] == bytes([DENSE_TAG]):
+            record, digest = self.dense(Reader(payload[1:]))
+            return {"Record": record}, digest
+        reply = REPLY.decode(payload)
+        if "Record" in reply:
+            self.take(reply["Record"])
+            self.lost = False
+        return reply, None
+
+    def take(self, record):
+        self.last = record
+        if record["counts"]:
+            self.counts = record["sequence"], record["counts"]
+
+    def dense(self, body):
+        """What goes on from the record before; see "Decoding" in section 6."""
+        if self.last is None:
+            raise Unusable("NoFullRecord")
+        if self.lost:
+            raise Unusable("Lost")
+        last, half = self.last, Fixed("e")
+        sequence, tick, state, parts, cycles, late = struct.unpack("<BHBBHB", body.take(8))
+        mode, events, size = state & 7, state >> 3 & 7, parts & 15
+        if state >> 6 or mode >= len(MODES) or size > 8:
+            raise Malformed("a dense record with unknown bits")
+        sequence = not_below(last["sequence"], sequence, 8)
+        passed = (sequence - last["sequence"]) % 2**32
+        whole_tick = (last["tick"] + passed * last["decimation"]) % 2**32
+        counted_at, counts = self.counts
+        far = size and (sequence - counted_at) % 2**32 > WINDOW
+        if not 1 <= passed <= WINDOW or tick != whole_tick % 2**16 or far:
+            self.lost = True
+            raise Unusable("Lost")
+        record = {
+            "sequence": sequence,
+            "tick": whole_tick,
+            "mode": MODES[mode],
+            "fault": None,
+            "answer": None,
+            "events": events,
+            "reading_failed": None,
+            **{name: half.read(body) for name in MONITORS},
+            "cycles": 4 * cycles,
+            "late_ticks": not_below(last["late_ticks"], late & 15, 4),
+            "dropped": not_below(last["dropped"], late >> 4, 4),
+            "decimation": last["decimation"],
+            "counts": [],
+            "torques_nm": [],
+            "limiting": [0] * len(last["limiting"]),
+        }
+        for bit, part in [(16, "fault"), (32, "reading_failed")]:
+            if parts & bit:
+                fault, joint = Known(FAULTS).read(body), BYTE.read(body)
+                record[part] = {"fault": fault, "joint": None if joint == 255 else joint}
+        if size:
+            low = nibbles(body.take((len(counts) * size + 1) // 2), size, len(counts))
+            record["counts"] = [nearest(*count, 4 * size) for count in zip(counts, low)]
+        if parts & 64:
+            record["torques_nm"] = [half.read(body) for _ in last["torques_nm"]]
+        if parts & 128:
+            joints = len(last["limiting"])
+            record["limiting"] = nibbles(body.take((joints + 1) // 2), 1, joints)
+        check, digest = struct.unpack("<BH", body.take(3))
+        if body.at < len(body.data):
+            raise Malformed("there are bytes after the record")
+        numbers = [record[part] for part in ("sequence", "tick", "late_ticks", "dropped", "decimation")]
+        if mix(numbers + record["counts"]) >> 24 != check:
+            self.lost = True
+            raise Unusable("Lost")
+        self.take(record)
+        return record, digest
+
+
+# ------------------------------------------------------------------------------------------------------- The lines
+
+
+class Line:
+    """Bytes to a hand and back, over files that never block."""
+
+    def __init__(self, source, sink, kept=None):
+        self.source, self.sink, self.kept = source, sink, kept
+        for file in {source, sink}:
+            os.set_blocking(file, False)
+
+    @classmethod
+    def open(cls, port):
+        try:
+            if port.startswith("unix:"):
+                connection = socket.socket(socket.AF_UNIX)
+                connection.connect(port[5:])
+                return cls(connection.fileno(), connection.fileno(), connection)
+            if port.startswith("pipes:"):
+                source, _, sink = port[6:].partition(",")
+                return cls.pipes(source, sink, time.monotonic() + 10)
+            return cls(*[cls.serial(port)] * 2)
+        except OSError as error:
+            raise BadInput(f"cannot open {port}: {error.strerror}") from error
+
+    @staticmethod
+    def serial(path):
+        """8 bits, no parity, a stop bit, 1 Mbaud; a pseudo-terminal has no baud rate, and takes it."""
+        import termios
+
+        port = os.open(path, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
+        try:
+            settings = termios.tcgetattr(port)
+            speed = getattr(termios, "B1000000", None)
+            if speed is None:
+                raise BadInput("this system's termios knows no 1000000 baud")
+            control = termios.CS8 | termios.CREAD | termios.CLOCAL
+            settings[:6] = [0, 0, control, 0, speed, speed]
+            settings[6][termios.VMIN], settings[6][termios.VTIME] = 0, 0
+            termios.tcsetattr(port, termios.TCSANOW, settings)
+            termios.tcflush(port, termios.TCIFLUSH)
+        except termios.error as error:
+            raise BadInput(f"{path} is no serial port: {error.args[-1]}") from None
+        return port
+
+    @classmethod
+    def pipes(cls, source, sink, deadline, is_alive=lambda: True):
+        """Reading needs nobody at the other end; writing does, and so it is waited for."""
+        source = os.open(source, os.O_RDONLY | os.O_NONBLOCK)
+        while True:
+            try:
+                return cls(source, os.open(sink, os.O_WRONLY | os.O_NONBLOCK))
+            except OSError as error:
+                if error.errno != errno.ENXIO or time.monotonic() > deadline or not is_alive():
+                    raise
+                time.sleep(0.002)
+
+    def write(self, data):
+        deadline = time.monotonic() + PATIENCE_S
+        while data:
+            try:
+                data = data[os.write(self.sink, data) :]
+            except BlockingIOError:
+                if time.monotonic() > deadline:
+                    raise Trouble("the line takes no more bytes") from None
+                select.select([], [self.sink], [], 0.1)
+            except OSError as error:
+                raise Trouble(f"the line is cut: {error.strerror}") from error
+
+    def read(self, patience_s):
+        """What there is, within that time; b"" if nothing came."""
+        if not select.select([self.source], [], [], max(patience_s, 0))[0]:
+            return b""
+        try:
+            data = os.read(self.source, 65536)
+        except BlockingIOError:
+            return b""
+        except OSError as error:
+            raise Trouble(f"the line is cut: {error.strerror}") from error
+        if not data:
+            raise Trouble("the hand hung up")
+        return data
+
+
+# ----------------------------------------------------------------------------------------------------- 5. Sessions
+
+
+class Session:
+    """A conversation with one hand: requests and their answers, the heartbeat, records."""
+
+    def __init__(self, line, on_record=lambda record: None):
+        self.line, self.on_record = line, on_record
+        self.frames, self.replies = Frames(), Replies()
+        self.number, self.sequence, self.identity = 0, 0, None
+        self.waiting = set()  # numbers of heartbeats without an answer
+        self.next_heartbeat = None
+        self.records, self.dense, self.lost, self.unusable, self.malformed = 0, 0, 0, 0, 0
+        self.last_record, self.snapshots, self.parts = None, 0, {}
+        line.write(b"\0")  # ends whatever is on the line
+
+    def send(self, request):
+        self.sequence = self.sequence + 1 & 0xFFFF
+        packet = {"session": self.number, "sequence": self.sequence, "request": request}
+        self.line.write(encode_frame(PACKET.encode(packet)))
+        return self.sequence
+
+    def hear(self, patience_s):
+        """Everything that came within that time and is neither a record nor the answer to a heartbeat."""
+        heard = []
+        for payload in self.frames.push(self.line.read(patience_s)):
+            try:
+                reply, digest = self.replies.decode(payload)
+                self.dense += digest is not None
+            except Unusable:
+                self.unusable += 1
+                continue
+            except Malformed:
+                heard.append({"Malformed": payload})
+                self.malformed += 1
+                continue
+            (kind, body), = reply.items()
+            if kind == "Record":
+                self.take(body)
+            elif kind == "Snapshot":
+                self.collect(body)
+            elif kind == "Answer" and body["sequence"] in self.waiting:
+                self.waiting.discard(body["sequence"])
+            else:
+                heard.append(reply)
+        return heard
+
+    def take(self, record):
+        if self.last_record is not None:
+            self.lost += (record["sequence"] - self.last_record["sequence"] - 1) % 2**32
+        self.records += 1
+        self.last_record = record
+        self.on_record(record)
+
+    def collect(self, part):
+        """Parts of a snapshot of the state: bytes to keep, not to look into."""
+        if part["offset"] == 0 or self.parts.get("tick") != part["tick"]:
+            self.parts = {"tick": part["tick"], "bytes": b""}
+        if part["offset"] == len(self.parts["bytes"]):
+            self.parts["bytes"] += bytes(part["bytes"])
+            self.snapshots += len(self.parts["bytes"]) == part["length"]
+
+    def beat(self):
+        """Sends a heartbeat when it is time for one."""
+        now = time.monotonic()
+        if self.next_heartbeat is not None and now >= self.next_heartbeat:
+            self.next_heartbeat = now + HEARTBEAT_S
+            if len(self.waiting) < WAITING_MOST:
+                self.waiting.add(self.send("Heartbeat"))
+
+    def pump(self, seconds, until=lambda: False):
+        """Lives for that long, or until something is so; tells whether it came to be."""
+        deadline = time.monotonic() + seconds
+        while not until():
+            left = deadline - time.monotonic()
+            if left <= 0:
+                return False
+            self.beat()
+            self.hear(min(left, HEARTBEAT_S / 5))
+        return True
+
+    def ask(self, request, patience_s=PATIENCE_S):
+        """Sends a request and returns its reply; a refusal is trouble."""
+        sequence, deadline = self.send(request), time.monotonic() + patience_s
+        while time.monotonic() < deadline:
+            for reply in self.hear(HEARTBEAT_S / 5):
+                (kind, body), = reply.items()
+                if kind == "Malformed":
+                    self.look_for_version(body)
+                elif body["sequence"] == sequence:
+                    if kind == "Answer" and body["refused"]:
+                        raise Refused(request, body["refused"])
+                    return reply
+            self.beat()
+        raise Trouble(f"no answer within {patience_s} s: is it the right port, and does the firmware run?")
+
+    @staticmethod
+    def look_for_version(payload):
+        """Of a reply that can't be read: is it the identity of another version?"""
+        try:
+            theirs = ANY_IDENTITY.read(Reader(payload))["interface_version"]
+        except Malformed:
+            return
+        if theirs != INTERFACE_VERSION:
+            raise Trouble(f"the hand has interface version {theirs}, this client {INTERFACE_VERSION}")
+
+    def hello(self, patience_s=5.0):
+        """Begins a session; a firmware that is still starting is waited for."""
+        deadline = time.monotonic() + patience_s
+        while True:
+            try:
+                reply = self.ask({"Hello": {"interface_version": INTERFACE_VERSION}}, PATIENCE_S / 2)
+                break
+            except Trouble as trouble:
+                if time.monotonic() > deadline or "no answer" not in str(trouble):
+                    raise
+        self.identity, self.number = reply["Identity"]["identity"], reply["Identity"]["session"]
+        theirs = self.identity["image"]["interface_version"]
+        if theirs != INTERFACE_VERSION:
+            raise Trouble(f"the hand has interface version {theirs}, this client {INTERFACE_VERSION}")
+        self.next_heartbeat = time.monotonic()
+        self.beat()
+        return self.identity
+
+    def command(self, command):
+        return self.ask({"Command": command})
+
+    def telemetry(self, decimation, signals):
+        # Records of before do not count as lost.
+        self.last_record = None
+        return self.ask({"Telemetry": {"decimation": decimation, "signals": signals}})
+
+    def counted(self):
+        return {
+            "records": self.records,
+            "dense": self.dense,
+            "lost": self.lost,
+            "unusable": self.unusable,
+            "damaged": self.frames.damaged,
+            "malformed": self.malformed,
+            "snapshots": self.snapshots,
+        }
+
+
+# --------------------------------------------------------------------------------- 7. The processor in the loop
+
+
+class Plant:
+    """Joints that are springs with dampers; torques act for the millisecond after they came."""
+
+    INERTIA_KG_M2, STIFFNESS_NM_RAD, STEPS = 1e-3, 5.0, 10
+
+    def __init__(self, joints, angle_rad, counts_per_turn):
+        self.rest_rad, self.counts_rad = angle_rad, counts_per_turn / (2 * math.pi)
+        self.damping_nm_s = 2 * math.sqrt(self.INERTIA_KG_M2 * self.STIFFNESS_NM_RAD)  # critical
+        self.angles_rad, self.speeds_rad_s = [angle_rad] * joints, [0.0] * joints
+
+    def counts(self):
+        return [math.floor(angle * self.counts_rad) for angle in self.angles_rad]
+
+    def advance(self, torques_nm, period_s):
+        step_s = period_s / self.STEPS
+        for k, torque_nm in enumerate(torques_nm):
+            for _ in range(self.STEPS):
+                spring_nm = self.STIFFNESS_NM_RAD * (self.rest_rad - self.angles_rad[k])
+                sum_nm = torque_nm + spring_nm - self.damping_nm_s * self.speeds_rad_s[k]
+                self.speeds_rad_s[k] += step_s * sum_nm / self.INERTIA_KG_M2
+                self.angles_rad[k] += step_s * self.speeds_rad_s[k]
+
+
+class Lockstep(Session):
+    """The image `pil`: a tick for each sample of joints, which ends with its record."""
+
+    def knock(self, patience_s=20.0):
+        """Requests wait for the joints; but what is no request is refused at once, and so the start is seen."""
+        deadline = time.monotonic() + patience_s
+        while time.monotonic() < deadline:
+            self.sequence += 1
+            self.line.write(encode_frame(varint(0, 16) + varint(self.sequence, 16) + b"\x7f"))
+            again = time.monotonic() + 0.3
+            while time.monotonic() < again:
+                answers = [reply["Answer"]["sequence"] for reply in self.hear(0.05) if "Answer" in reply]
+                if self.sequence in answers:
+                    return
+        raise Trouble(f"no firmware answers within {patience_s} s")
+
+    def turn(self, counts, request=None):
+        """One tick with its request; returns the reply to that, and the record."""
+        sequence = None if request is None else self.send(request)
+        self.send({"Joints": {"counts": counts, "failed": None, "late": False}})
+        deadline, ticks, answer = time.monotonic() + 10 * PATIENCE_S, self.records, None
+        while self.records == ticks:
+            if time.monotonic() > deadline:
+                raise Trouble("the firmware does not answer")
+            for reply in self.hear(0.1):
+                (kind, body), = reply.items()
+                if kind == "Answer" and body["refused"]:
+                    raise Refused(request, body["refused"])
+                answer = reply if body["sequence"] == sequence else answer
+        return answer, self.last_record
+
+
+class Qemu:
+    """The image `pil` in QEMU, over two named pipes; it ends when they are closed."""
+
+    def __init__(self, image):
+        if shutil.which("qemu-system-arm") is None:
+            raise BadInput("qemu-system-arm is not installed, or not in PATH")
+        if not os.path.isfile(image):
+            raise BadInput(f"there is no image {image}")
+        self.folder = tempfile.TemporaryDirectory(prefix="blindgrasp-")
+        to, self.source = (os.path.join(self.folder.name, name) for name in ("to", "from"))
+        os.mkfifo(to)
+        os.mkfifo(self.source)
+        command = "qemu-system-arm -M netduinoplus2 -nographic -monitor none -serial null -serial null".split()
+        command += ["-semihosting-config", "enable=on,target=native,arg=fifo,arg=to,arg=from"]
+        command += ["-kernel", os.path.abspath(image)]
+        quiet = dict.fromkeys(["stdin", "stdout"], subprocess.DEVNULL)
+        self.process = subprocess.Popen(command, cwd=self.folder.name, **quiet)
+        try:
+            alive = lambda: self.process.poll() is None
+            self.line = Line.pipes(self.source, to, time.monotonic() + 20, alive)
+        except OSError as error:
+            self.end()
+            raise Trouble("QEMU does not start the image; is it the image `pil`?") from error
+
+    def end(self):
+        self.process.kill()
+        self.process.wait()
+        self.folder.cleanup()
+
+
+def run_pil(session, args, out):
+    """Arms, grasps, releases and disarms the emulated hand; the joints are ours."""
+    session.knock()
+    plant = Plant(args.joints, args.angle, args.counts_per_turn)
+    answer, record = session.turn(plant.counts(), {"Hello": {"interface_version": INTERFACE_VERSION}})
+    identity, session.number = answer["Identity"]["identity"], answer["Identity"]["session"]
+    image = identity["image"]
+    if image["interface_version"] != INTERFACE_VERSION or image["kind"] != "pil":
+        raise Trouble(f"this is the image `{image['kind']}`, interface {image['interface_version']}")
+    if image["joint_count"] != args.joints:
+        raise Trouble(f"the hand `{image['hand']}` has {image['joint_count']} joints: tell so with --joints")
+    period_s = image["period_us"] * 1e-6
+    firmness = {"force_n": args.force, "attitude_stiffness_nm": None}
+    at = {part: round(args.ticks * share) for part, share in [("grasp", 0.1), ("release", 0.5), ("end", 0.95)]}
+    script = {3: "Arm", at["grasp"]: {"Grasp": firmness}, at["release"]: "Release"}
+    script[at["end"]] = "Disarm"
+    modes, largest_nm = [], {mode: 0.0 for mode in MODES}
+    for tick in range(args.ticks):
+        request = {"Command": script[tick]} if tick in script else "Heartbeat" if tick % 50 == 2 else None
+        answer, record = session.turn(plant.counts(), request)
+        if request and answer is None:
+            raise Trouble(f"tick {tick} did not answer {request}")
+        if record["counts"] != plant.counts():
+            raise Trouble(f"tick {tick} tells other counts than it was sent")
+        if record["mode"] == "Fault":
+            raise Trouble(told_fault(record["fault"]))
+        if modes[-1:] != [record["mode"]]:
+            modes.append(record["mode"])
+        largest_nm[record["mode"]] = max(map(abs, record["torques_nm"] + [largest_nm[record["mode"]]]))
+        plant.advance(record["torques_nm"], period_s)
+    result = {"ticks": args.ticks, "modes": modes, "largest_torque_nm": largest_nm, **session.counted()}
+    print(json.dumps(result), file=out)
+    wanted = ["Disarmed", "Armed", "Grasping", "Releasing", "Armed", "Disarmed"]
+    if modes != wanted:
+        raise Trouble(f"the modes are not {', '.join(wanted)}")
+    if largest_nm["Disarmed"] or not largest_nm["Grasping"] > 0:
+        raise Trouble("torque where there should be none, or none where there should be some")
+    return 0
+
+
+# -------------------------------------------------------------------------------------------------- The commands
+
+
+def csv_line(record):
+    fault = record["fault"] or {"fault": 0, "joint": None}
+    head = [record[name] for name in ("sequence", "tick", "mode")] + [fault["fault"], fault["joint"], record["events"]]
+    head += [record[name] for name in MONITORS + ["cycles", "late_ticks", "dropped", "decimation"]]
+    cells = head + record["counts"] + record["torques_nm"] + record["limiting"]
+    return ",".join("" if cell is None else f"{cell:.9g}" if isinstance(cell, float) else str(cell) for cell in cells)
+
+
+def csv_head(record):
+    names = ["sequence", "tick", "mode", "fault", "fault_joint", "events"] + MONITORS
+    names += ["cycles", "late_ticks", "dropped", "decimation"]
+    parts = [("counts", "count_{}"), ("torques_nm", "torque_{}_nm"), ("limiting", "limiting_{}")]
+    return ",".join(names + [name.format(k) for part, name in parts for k in range(len(record[part]))])
+
+
+class Printer:
+    """Prints records: each as a line of CSV, or now and then one in words."""
+
+    def __init__(self, as_csv, out):
+        self.as_csv, self.out, self.columns, self.told = as_csv, out, None, None
+
+    def __call__(self, record):
+        if self.as_csv:
+            if self.columns is None:
+                self.columns = csv_head(record)
+                print(self.columns, file=self.out)
+            print(csv_line(record), file=self.out)
+        elif self.told is None or record["mode"] != self.told["mode"] or record["tick"] - self.told["tick"] >= 500:
+            fault = "" if record["fault"] is None else ", " + told_fault(record["fault"])
+            torque_nm = max(map(abs, record["torques_nm"]), default=0.0)
+            words = f"force {record['force_n']:.3g} N, largest torque {torque_nm:.3g} N m"
+            print(f"tick {record['tick']}: {record['mode']}{fault}; {words}", file=self.out)
+            self.told = record
+
+
+def parameter(text):
+    """`limits.torque_nm[3]` to its name on the wire and index."""
+    key, _, index = text.partition("[")
+    names = {known: name for name, known in PARAMETERS.items()}
+    if key not in names:
+        raise BadInput(f"there is no parameter {key}; there are {', '.join(names)}")
+    if index and not (index[-1] == "]" and index[:-1].isdecimal() and int(index[:-1]) < 256):
+        raise BadInput(f"{text}: an index is a number in brackets, as in {key}[0]")
+    return {"parameter": names[key], "index": int(index[:-1] or 0) if index else 0}
+
+
+def finite(text):
+    value = float(text)
+    if not math.isfinite(value):
+        raise argparse.ArgumentTypeError(f"{text} is not a finite number")
+    return value
+
+
+def run_grasp(session, args):
+    """Arms, grasps, holds and releases, with telemetry; whatever happens, the hand is stopped at the end."""
+    state = lambda: session.last_record and session.last_record["mode"]
+    session.telemetry(args.decimation, args.signals)
+    try:
+        session.command("Arm")
+        session.command({"Grasp": {"force_n": args.force, "attitude_stiffness_nm": args.stiffness}})
+        if session.pump(args.hold, lambda: state() == "Fault"):
+            raise Trouble(told_fault(session.last_record["fault"]))
+        session.command("Release")
+        if not session.pump(10.0, lambda: state() in ("Armed", "Fault")) or state() == "Fault":
+            raise Trouble("the release does not end as it should")
+        session.command("Disarm")
+        session.pump(PATIENCE_S, lambda: state() == "Disarmed")
+    except BaseException:
+        session.command("Stop")
+        raise
+    finally:
+        session.telemetry(0, 0)
+
+
+def run_burst(session, printer):
+    """The records around the last fault."""
+    index, count = 0, 1
+    while index < count:
+        reply = session.ask({"Burst": {"index": index}})["Burst"]
+        index, count = index + 1, reply["count"]
+        printer(reply["record"])
+
+
+def run(args, out):
+    if args.command == "pil":
+        qemu = Qemu(args.image) if args.image else None
+        try:
+            return run_pil(Lockstep(qemu.line if qemu else Line.open(args.port)), args, out)
+        finally:
+            if qemu:
+                qemu.end()
+    printer = Printer(getattr(args, "csv", False), out)
+    settings = [parameter(args.key)] if args.command in ("get", "set") else []
+    session = Session(Line.open(args.port), printer)
+    if args.command == "stop":  # of nobody's session, and without a hello
+        session.command("Stop")
+        return 0
+    identity = session.hello()
+    if args.command == "info":
+        print(json.dumps(identity, indent=2), file=out)
+    elif args.command == "get":
+        print(session.ask({"GetParameter": settings[0]})["Value"]["value"], file=out)
+    elif args.command == "set":
+        session.ask({"SetParameter": {**settings[0], "value": args.value}})
+    elif args.command == "clear":
+        session.command("ClearFault")
+    elif args.command == "watch":
+        session.telemetry(args.decimation, args.signals)
+        session.pump(args.seconds)
+        session.telemetry(0, 0)
+    elif args.command == "burst":
+        run_burst(session, printer)
+    elif args.command == "grasp":
+        run_grasp(session, args)
+    print(json.dumps(session.counted()), file=sys.stderr)
+    return 0
+
+
+# -------------------------------------------------------------------------------------------------- The self-test
+
+
+def single(value):
+    """The same with every number as near to what was meant as 32 bits can have it."""
+    if isinstance(value, dict):
+        return {name: single(item) for name, item in value.items()}
+    if isinstance(value, list):
+        return [single(item) for item in value]
+    return F32.decode(F32.encode(value)) if isinstance(value, float) else value
+
+
+def check(told, name, got, wanted):
+    if got != wanted:
+        told.append(f"{name}:\n  is     {got}\n  should {wanted}")
+
+
+def self_test(path, out):
+    """Decodes and encodes the vectors that the Rust code has made."""
+    try:
+        with open(path, encoding="utf-8") as file:
+            vectors = json.load(file)
+    except (OSError, ValueError) as error:
+        raise BadInput(f"{path}: {error}") from error
+    told = []
+    check(told, "interface version", vectors["interface_version"], INTERFACE_VERSION)
+    for vector in vectors["messages"]:
+        name, payload = vector["name"], bytes.fromhex(vector["payload"])
+        kind, message = (PACKET if vector["from"] == "host" else REPLY), single(vector["message"])
+        check(told, name + ", decoded", single(kind.decode(payload)), message)
+        check(told, name + ", encoded", kind.encode(message).hex(), vector["payload"])
+    for vector in vectors["messages"] + vectors["frames"]:
+        payload, frame = bytes.fromhex(vector["payload"]), bytes.fromhex(vector["frame"])
+        check(told, vector["name"] + ", framed", encode_frame(payload).hex(), vector["frame"])
+    for vector in vectors["messages"] + vectors["frames"] + vectors["also_good"]:
+        payload, frame = bytes.fromhex(vector["payload"]), bytes.fromhex(vector["frame"])
+        check(told, vector["name"] + ", received", Frames().push(frame), [payload])
+    for vector in vectors["damaged_frames"]:
+        frame, why = bytes.fromhex(vector["frame"]), "good"
+        try:
+            decode_frame(frame[:-1])
+        except DamagedFrame as damage:
+            why = str(damage)
+        check(told, vector["name"], why, vector["why"])
+    for vector in vectors["malformed"]:
+        kind, why = (PACKET if vector["from"] == "host" else REPLY), "good"
+        try:
+            kind.decode(bytes.fromhex(vector["payload"]))
+        except Malformed:
+            why = "malformed"
+        check(told, vector["name"], why, "malformed")
+    for stream in vectors["streams"]:
+        replies = Replies()
+        for number, step in enumerate(stream["steps"]):
+            try:
+                reply, digest = replies.decode(bytes.fromhex(step["payload"]))
+                got = {"record": single(reply["Record"]), "digest": digest}
+            except Unusable as reason:
+                got = str(reason)
+            check(told, f"{stream['name']}, step {number}", got, single(step["heard"]))
+    counts = ", ".join(f"{len(part)} {name}" for name, part in vectors.items() if isinstance(part, list))
+    if told:
+        raise Trouble("\n".join(told))
+    print(f"ok: {counts}", file=out)
+    return 0
+
+
+def arguments():
+    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0], epilog="docs/protocol.md describes the wire.")
+    parser.add_argument("--self-test", metavar="FILE", help="decode and encode the test vectors of a file")
+    commands = parser.add_subparsers(dest="command", metavar="COMMAND")
+
+    def command(name, words, telemetry=False):
+        added = commands.add_parser(name, help=words, description=words)
+        required = name != "pil"
+        added.add_argument("--port", required=required, help="serial port, unix:PATH, or pipes:IN,OUT")
+        if telemetry:
+            added.add_argument("--csv", action="store_true", help="each record as a line of CSV")
+            added.add_argument("--decimation", type=int, default=1, help="one record in so many ticks")
+            full = ["--full", "dest=signals", "records in their full form, not the dense one"]
+            added.add_argument(full[0], dest="signals", action="store_const", help=full[2],
+                               const=COUNTS | TORQUES | LIMITING, default=COUNTS | TORQUES | LIMITING | DENSE | STATE)
+        return added
+
+    command("info", "who the hand is")
+    command("stop", "take the torque away at once")
+    command("clear", "leave a fault whose cause is gone")
+    command("get", "a parameter").add_argument("key", help="as in limits.torque_nm[3]")
+    setter = command("set", "set a parameter of a disarmed hand")
+    setter.add_argument("key", help="as in limits.torque_nm[3]")
+    setter.add_argument("value", type=finite)
+    command("watch", "print records", True).add_argument("--seconds", type=finite, default=10.0)
+    command("burst", "print the records around the last fault").add_argument("--csv", action="store_true")
+    grasp = command("grasp", "arm, grasp, hold, release, disarm", True)
+    grasp.add_argument("--force", type=finite, help="N; as configured if left out")
+    grasp.add_argument("--stiffness", type=finite, help="of the relative attitudes, N m; as configured if left out")
+    grasp.add_argument("--hold", type=finite, default=5.0, help="seconds")
+    pil = command("pil", "be the joints of the image `pil`: springs with dampers, in lockstep")
+    pil.add_argument("--image", help="start this image in QEMU, instead of --port")
+    pil.add_argument("--joints", type=int, default=12, help="of the hand")
+    pil.add_argument("--ticks", type=int, default=1500)
+    pil.add_argument("--force", type=finite, default=1.0, help="N")
+    pil.add_argument("--angle", type=finite, default=0.3, help="at which the joints rest, rad")
+    pil.add_argument("--counts-per-turn", type=finite, default=21600.0, help="of the encoders, at the joint")
+    args = parser.parse_args()
+    if not args.self_test and not args.command:
+        parser.error("a command or --self-test is needed")
+    if args.command == "pil" and bool(args.image) == bool(args.port):
+        parser.error("pil needs either --image or --port")
+    if args.command == "pil" and args.ticks < 1000:
+        parser.error("a grasp and its release need --ticks of at least 1000")
+    if not 1 <= getattr(args, "decimation", 1) <= 0xFFFF:
+        parser.error("--decimation is from 1 to 65535")
+    return args
+
+
+def main():
+    args = arguments()
+    try:
+        return self_test(args.self_test, sys.stdout) if args.self_test else run(args, sys.stdout)
+    except (Trouble, BadInput) as error:
+        print(f"blindgrasp_client.py: {error}", file=sys.stderr)
+        return 2 if isinstance(error, BadInput) else 1
+    except BrokenPipeError:
+        return 1
+    except KeyboardInterrupt:
+        return 130
+
+
+if __name__ == "__main__":
+    sys.exit(main())

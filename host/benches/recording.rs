@@ -1,0 +1,95 @@
+//! What recording and reading cost: a record of twelve joints.
+
+#![allow(clippy::unwrap_used)]
+
+use blindgrasp::MAX_JOINTS;
+use blindgrasp::record::mcap::{Decoder, Entry, Recording, What, Writer};
+use blindgrasp::scene::Scene;
+use blindgrasp::sim::Simulation;
+use blindgrasp::sim::recorder::Recorder;
+use blindgrasp_shared::link::message::{Reply, Signals};
+use blindgrasp_shared::link::{Receiver, Sender};
+use criterion::{BatchSize, Criterion, Throughput, criterion_group, criterion_main};
+use std::path::Path;
+
+const FRAME: usize = Reply::<MAX_JOINTS>::MOST_BYTES + 16;
+
+/// What a hand says while it grasps a cube for so long, as full records or dense ones; what comes before them comes too.
+fn said(folder: &Path, duration_s: f64, dense: bool) -> Vec<Entry> {
+    let scene = Scene::load("cube", &[format!("duration_s={duration_s:?}")]).unwrap();
+    let path = folder.join("source.mcap");
+    let simulation = Simulation::new(&scene).unwrap();
+    let mut recorder = Recorder::create(&path, true, &scene, simulation.controller()).unwrap();
+    simulation.run_watched(|_| {}, |controller| recorder.tick(controller));
+    recorder.finish().unwrap();
+    let mut entries: Vec<Entry> =
+        Recording::open(&path).unwrap().entries().unwrap().map(Result::unwrap).collect();
+    entries.retain(|entry| !matches!(entry.what, What::Event { .. }));
+    let mut sender = Sender::<MAX_JOINTS>::new();
+    for entry in &mut entries {
+        let What::Received(payload) = &mut entry.what else { continue };
+        if let (true, Ok(Reply::Record(record))) = (dense, Reply::<MAX_JOINTS>::decode(payload)) {
+            let mut buffer = [0; FRAME];
+            let frame = sender.record(&record, Signals::FULL, &mut buffer).unwrap();
+            let mut receiver = Receiver::<FRAME>::new();
+            for &byte in frame {
+                if let Some(heard) = receiver.push(byte) {
+                    *payload = heard.unwrap().to_vec();
+                }
+            }
+        }
+    }
+    entries
+}
+
+fn write(path: &Path, entries: &[Entry]) -> u64 {
+    let mut writer = Writer::create(path, true).unwrap();
+    let device = writer.add_device("hand");
+    for Entry { at, what, .. } in entries {
+        match what {
+            What::About(about) => writer.about(device, *at, about).unwrap(),
+            What::Parameters(settings) => writer.parameters(device, *at, settings).unwrap(),
+            What::Received(payload) => {
+                writer.received(device, *at, payload).unwrap();
+            }
+            _ => {}
+        }
+    }
+    writer.finish().unwrap().bytes
+}
+
+fn recording(criterion: &mut Criterion) {
+    let folder = tempfile::tempdir().unwrap();
+    for (name, dense) in [("full", false), ("dense", true)] {
+        let entries = said(folder.path(), 5.0, dense);
+        let records = entries.iter().filter(|entry| matches!(entry.what, What::Received(_))).count() as u64;
+        let path = folder.path().join("a.mcap");
+        let bytes = write(&path, &entries);
+        println!(
+            "{name}: {records} payloads, {:.1} bytes in the file for each",
+            bytes as f64 / records as f64
+        );
+        let mut group = criterion.benchmark_group(format!("recording/{name}"));
+        group.throughput(Throughput::Elements(records)).sample_size(20);
+        group.bench_function("write, per record", |b| b.iter(|| write(&path, &entries)));
+        let open = || (Recording::open(&path).unwrap().entries().unwrap(), Decoder::new());
+        group.bench_function("read, per record", |b| {
+            b.iter_batched(open, |(entries, _)| entries.map(Result::unwrap).count(), BatchSize::PerIteration);
+        });
+        group.bench_function("read and decode, per record", |b| {
+            b.iter_batched(
+                open,
+                |(entries, mut decoder)| entries.filter_map(|entry| decoder.take(&entry.unwrap())).count(),
+                BatchSize::PerIteration,
+            );
+        });
+        group.throughput(Throughput::Bytes(bytes));
+        group.bench_function("read, bytes of the file", |b| {
+            b.iter_batched(open, |(entries, _)| entries.map(Result::unwrap).count(), BatchSize::PerIteration);
+        });
+        group.finish();
+    }
+}
+
+criterion_group!(benches, recording);
+criterion_main!(benches);

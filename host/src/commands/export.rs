@@ -1,0 +1,116 @@
+//! `blindgrasp export`: a recording as a table.
+
+use super::{Outcome, Span, chosen_device, damage_of, reading_bar, start_ns};
+use anyhow::{Context, bail};
+use blindgrasp::record::export::{ExportError, Exported, Format, Request, export};
+use blindgrasp::record::mcap::Recording;
+use clap::{Args, ValueEnum};
+use std::fs::OpenOptions;
+use std::io::{self, Write};
+use std::path::{Path, PathBuf};
+
+/// Write a recording as a table: a row a record
+///
+/// Units stand in the names of the columns; those of joints begin with the joint's name. What was not sent is empty, or null.
+/// Numbers keep all their bits. An hour of a hand of 12 joints takes seconds and little memory.
+///
+/// Exit code 0: everything is in the table; 1: the recording is damaged, and what could be read of it is; 2: there is no
+/// table, or bad usage.
+#[derive(Args)]
+pub(crate) struct Arguments {
+    /// A recording (MCAP) of `blindgrasp record` or `sim --out`
+    file: PathBuf,
+    /// The format
+    #[arg(long = "to", value_name = "FORMAT")]
+    format: To,
+    /// The table's file, or - for stdout [default: the recording's name with another ending]
+    #[arg(long, value_name = "FILE")]
+    out: Option<PathBuf>,
+    /// Overwrite the table's file
+    #[arg(long)]
+    force: bool,
+    /// The device, if the recording has several: hand1, hand2, ...
+    #[arg(long, value_name = "NAME")]
+    device: Option<String>,
+    /// Only these columns, separated by commas: names with * for anything, joints, or signals of all joints (angle_rad,
+    /// finger-1-abduct, finger-1-*.torque_nm); time_s is always there
+    #[arg(long, value_name = "LIST", value_delimiter = ',')]
+    signals: Vec<String>,
+    #[command(flatten)]
+    span: Span,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum To {
+    /// Comma-separated values with a header
+    Csv,
+    /// Apache Parquet with units in its metadata
+    Parquet,
+}
+
+/// Runs the command.
+pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
+    arguments.span.check()?;
+    let (format, ending) = match arguments.format {
+        To::Csv => (Format::Csv, "csv"),
+        To::Parquet => (Format::Parquet, "parquet"),
+    };
+    let recording = Recording::open(&arguments.file)?;
+    let request = Request {
+        device: chosen_device(&recording, arguments.device.as_deref())?,
+        signals: arguments.signals.clone(),
+        from_s: arguments.span.from,
+        until_s: arguments.span.until,
+        start_ns: start_ns(&recording),
+    };
+    let path = arguments.out.clone().unwrap_or_else(|| arguments.file.with_extension(ending));
+    let to: Box<dyn Write + Send> = if path == Path::new("-") {
+        Box::new(io::stdout())
+    } else {
+        Box::new(create(&path, arguments.force)?)
+    };
+    let mut entries = recording.entries()?;
+    let bar = reading_bar(&arguments.file);
+    let exported =
+        export(&mut entries, |entries| bar.set_position(entries.position().0), &request, format, to);
+    bar.finish_and_clear();
+    let exported = match exported {
+        Err(error) if is_broken_pipe(&error) => return Ok(Outcome::Shown),
+        exported => exported.with_context(|| path.display().to_string())?,
+    };
+    let Exported { rows, lost, gaps, ended } = exported;
+    eprintln!("blindgrasp: {}: {rows} rows; {lost} records lost, {gaps} gaps", path.display());
+    let is_whole = ended.is_none() && entries.damage().is_none();
+    for words in [ended, damage_of(&recording, &entries)].into_iter().flatten() {
+        eprintln!("blindgrasp: {}: {words}", arguments.file.display());
+    }
+    Ok(if is_whole { Outcome::Shown } else { Outcome::Failed })
+}
+
+fn create(path: &Path, force: bool) -> anyhow::Result<std::fs::File> {
+    let mut options = OpenOptions::new();
+    options.write(true);
+    let options = if force { options.create(true).truncate(true) } else { options.create_new(true) };
+    match options.open(path) {
+        Err(error) if error.kind() == io::ErrorKind::AlreadyExists => {
+            bail!(
+                "{}: is there already; choose another with --out, or overwrite it with --force",
+                path.display()
+            )
+        }
+        opened => opened.with_context(|| format!("cannot write {}", path.display())),
+    }
+}
+
+/// Whether the reader of stdout has seen enough.
+fn is_broken_pipe(error: &ExportError) -> bool {
+    let is_it = |error: &io::Error| error.kind() == io::ErrorKind::BrokenPipe;
+    match error {
+        ExportError::Write(error) => is_it(error),
+        ExportError::Csv(error) => matches!(error.kind(), csv::ErrorKind::Io(error) if is_it(error)),
+        ExportError::Parquet(error) => {
+            std::error::Error::source(error).and_then(|source| source.downcast_ref()).is_some_and(is_it)
+        }
+        _ => false,
+    }
+}

@@ -1,0 +1,157 @@
+//! A hand that talks at random.
+
+use blindgrasp::MAX_JOINTS;
+use blindgrasp::record::mcap::{About, Entry, Record, Recording, Setting, What};
+use blindgrasp::scene::{HandFile, HandModel};
+use blindgrasp_shared::command::{Answer, Command, Refusal};
+use blindgrasp_shared::event::{Event, Events};
+use blindgrasp_shared::fault::{Fault, Raised};
+use blindgrasp_shared::identity::{Clock, Identity, Image, ResetCause, UNITS};
+use blindgrasp_shared::limit::{Limit, Limiting};
+use blindgrasp_shared::link::message::{Reply, Signals};
+use blindgrasp_shared::link::{Receiver, Sender};
+use blindgrasp_shared::supervisor::Mode;
+use blindgrasp_shared::telemetry::{INTERFACE_VERSION, List};
+use blindgrasp_shared::tick::Params;
+use std::path::Path;
+
+const FRAME: usize = Reply::<MAX_JOINTS>::MOST_BYTES + 16;
+
+/// The payload of a frame.
+fn payload(frame: &[u8]) -> Vec<u8> {
+    let mut receiver = Receiver::<FRAME>::new();
+    let heard = frame.iter().find_map(|&byte| receiver.push(byte).map(|payload| payload.unwrap().to_vec()));
+    heard.unwrap()
+}
+
+/// Who a hand of `models/hands` is.
+pub(crate) fn about(hand: &str) -> About {
+    let file = HandFile::load(hand).unwrap();
+    let model = HandModel::load(hand).unwrap();
+    About::of(&Identity {
+        image: Image {
+            interface_version: INTERFACE_VERSION,
+            kind: "hand",
+            hand,
+            hand_hash: model.hash(),
+            firmware_version: "0.1.0",
+            build_hash: 0x0123_abcd,
+            joint_count: file.joints.len() as u8,
+            fingertip_count: file.fingertips.len() as u8,
+            period_us: 1000,
+        },
+        units: UNITS,
+        clock: Clock::External,
+        reset: ResetCause::PowerOn,
+        crash: None,
+    })
+    .with_hand(&file)
+}
+
+/// All parameters of a hand.
+pub(crate) fn settings(hand: &str) -> Vec<Setting> {
+    let model = HandModel::load(hand).unwrap();
+    let params =
+        Params::<f32, MAX_JOINTS, { blindgrasp::MAX_FINGERS }>::new(model.hand.cast(), &model.config);
+    Setting::all(&params.unwrap())
+}
+
+/// A hand that does what chance wants.
+pub(crate) struct Hand {
+    pub(crate) record: Record,
+    joints: usize,
+    sender: Sender<MAX_JOINTS>,
+}
+
+impl Hand {
+    pub(crate) fn new(joints: usize) -> Self {
+        let record = Record {
+            sequence: 0,
+            tick: 0,
+            mode: Mode::Disarmed,
+            fault: None,
+            answer: None,
+            events: Events::NONE,
+            reading_failed: None,
+            force_n: 0.0,
+            attitude_stiffness_nm: 0.0,
+            approach_potential_j: 0.0,
+            attitude_potential_j: 0.0,
+            energy_j: 0.0,
+            cycles: 0,
+            late_ticks: 0,
+            dropped: 0,
+            decimation: 1,
+            counts: List::default(),
+            torques_nm: List::default(),
+            limiting: List::default(),
+        };
+        Self { record, joints, sender: Sender::new() }
+    }
+
+    /// The next record, and the payload that it makes.
+    pub(crate) fn tick(&mut self, random: &mut fastrand::Rng) -> (Record, Vec<u8>) {
+        let record = &mut self.record;
+        record.sequence = record.sequence.wrapping_add(1);
+        record.tick = record.tick.wrapping_add(1);
+        let mut rare = |one_in: u32| random.u32(0..one_in) == 0;
+        if rare(50) {
+            record.mode = Mode::ALL[random.usize(0..Mode::ALL.len())];
+        }
+        let mut rare = |one_in: u32| random.u32(0..one_in) == 0;
+        let (failed, answers, faulty, limited) = (rare(40), rare(30), rare(60), rare(4));
+        if faulty {
+            let fault = Fault::ALL[random.usize(0..Fault::ALL.len())];
+            record.fault = random.bool().then(|| Raised::at(random.usize(0..self.joints), fault));
+        }
+        record.answer = answers.then(|| Answer {
+            command: Command::ALL[random.usize(0..6)],
+            refused: random.bool().then_some(Refusal::NotArmed),
+        });
+        record.reading_failed = failed.then(|| Raised::at(0, Fault::SampleMissing));
+        record.events = Events::NONE.with(Event::Heartbeat, random.bool()).with(Event::Late, limited);
+        let mut float = |scale: f32| scale * (random.f32() - 0.5);
+        record.force_n = float(20.0);
+        record.attitude_stiffness_nm = float(0.01);
+        record.approach_potential_j = float(1.0);
+        record.attitude_potential_j = float(1.0);
+        record.energy_j = float(1.0);
+        let mut torques = [0.0; MAX_JOINTS];
+        torques[..self.joints].iter_mut().for_each(|torque| *torque = float(3.0));
+        record.torques_nm = List::first_of(torques, self.joints);
+        record.cycles = random.u32(0..100_000);
+        record.late_ticks += u32::from(limited);
+        let mut counts = [0; MAX_JOINTS];
+        for (k, count) in counts[..self.joints].iter_mut().enumerate() {
+            let before = record.counts.as_slice().get(k).copied().unwrap_or(1000 * k as i32 - 3000);
+            *count = before + random.i32(-20..=20);
+        }
+        record.counts = List::first_of(counts, self.joints);
+        let mut limiting = [Limiting::NONE; MAX_JOINTS];
+        if limited {
+            limiting[random.usize(0..self.joints)].insert(Limit::ALL[random.usize(0..4)]);
+        }
+        record.limiting = List::first_of(limiting, self.joints);
+        let mut sent = record.clone();
+        if failed {
+            sent.counts = List::default();
+        }
+        let mut buffer = [0; FRAME];
+        let payload = payload(self.sender.record(&sent, Signals::FULL, &mut buffer).unwrap());
+        (sent, payload)
+    }
+}
+
+/// All entries of a file, and what was wrong with it.
+pub(crate) fn read(path: &Path) -> (Vec<Entry>, blindgrasp::record::mcap::Damage, Recording) {
+    let recording = Recording::open(path).unwrap();
+    let mut entries = recording.entries().unwrap();
+    let all = entries.by_ref().map(Result::unwrap).collect();
+    let damage = entries.damage().clone();
+    (all, damage, recording)
+}
+
+/// Whether an entry is one that the writer made by itself.
+pub(crate) fn is_derived(entry: &Entry) -> bool {
+    matches!(&entry.what, What::Event { about, .. } if about != "event")
+}

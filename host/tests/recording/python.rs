@@ -1,0 +1,188 @@
+//! The Python package `mcap` reads the same as we do.
+
+use crate::hand::{Hand, about, read, settings};
+use blindgrasp::record::mcap::{Decoded, Decoder, Stamp, What, Writer};
+use blindgrasp_shared::limit::Limit;
+use serde_json::Value;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+/// A Python that has the packages, made once in the target directory; or why there is none.
+fn python() -> Result<(PathBuf, PathBuf), String> {
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("python-mcap");
+    let packages = folder.join("packages");
+    let python = PathBuf::from("python3");
+    let run = |arguments: &[&str]| {
+        let output = Command::new(&python).args(arguments).env("PYTHONPATH", &packages).output();
+        match output {
+            Ok(output) if output.status.success() => Ok(()),
+            Ok(output) => Err(String::from_utf8_lossy(&output.stderr).trim().to_owned()),
+            Err(error) => Err(error.to_string()),
+        }
+    };
+    let has_packages = || run(&["-c", "import mcap, mcap_protobuf"]);
+    if has_packages().is_err() {
+        let target = packages.to_string_lossy().into_owned();
+        run(&[
+            "-m",
+            "pip",
+            "install",
+            "--quiet",
+            "--target",
+            &target,
+            "mcap==1.3.0",
+            "mcap-protobuf-support==0.5.3",
+        ])?;
+    }
+    has_packages().map(|()| (python, packages))
+}
+
+/// A float as Python told it: every `f32` is an `f64` that JSON keeps.
+fn float(value: &Value) -> f32 {
+    value.as_f64().map_or(f32::NAN, |value| value as f32)
+}
+
+fn same(told: &Value, ours: f32) -> bool {
+    float(told).to_bits() == ours.to_bits() || (told.is_null() && ours.is_nan())
+}
+
+fn compare(told: &Value, ours: &Decoded, joint_names: &[String]) {
+    let record = &ours.record;
+    let numbers = [
+        ("log_time", ours.at.0),
+        ("sequence", record.sequence.into()),
+        ("tick", record.tick.into()),
+        ("cycles", record.cycles.into()),
+        ("late_ticks", record.late_ticks.into()),
+        ("dropped", record.dropped.into()),
+        ("decimation", record.decimation.into()),
+        ("lost_before", ours.lost_before),
+    ];
+    for (name, ours) in numbers {
+        assert_eq!(told[name].as_u64(), Some(ours), "{name}: {told}");
+    }
+    assert_eq!(told["time_s"].as_f64(), Some(ours.time_s));
+    assert_eq!(told["mode"], record.mode.words().to_uppercase());
+    let fault = record.fault.map_or("NO_FAULT".to_owned(), |raised| format!("{:?}", raised.fault));
+    assert_eq!(told["fault"].as_str().unwrap().replace('_', ""), fault.to_uppercase().replace('_', ""));
+    let joint = record.fault.and_then(|raised| raised.joint).map_or("", |k| &joint_names[usize::from(k)]);
+    assert_eq!(told["fault_joint"], joint);
+    let floats = [
+        ("force_n", record.force_n),
+        ("attitude_stiffness_nm", record.attitude_stiffness_nm),
+        ("approach_potential_j", record.approach_potential_j),
+        ("attitude_potential_j", record.attitude_potential_j),
+        ("energy_j", record.energy_j),
+    ];
+    for (name, ours) in floats {
+        assert!(same(&told[name], ours), "{name}: {told}, {ours}");
+    }
+    for (k, name) in joint_names.iter().enumerate() {
+        let told = &told["joints"][name.replace('-', "_")];
+        let count = record.counts.as_slice().get(k).map(|&count| i64::from(count));
+        assert_eq!(told["count"].as_i64(), count, "{told}");
+        let lists = [
+            ("angle_rad", &ours.angles_rad),
+            ("speed_rad_s", &ours.speeds_rad_s),
+            ("torque_nm", &record.torques_nm),
+        ];
+        for (name, list) in lists {
+            let ours = list.as_slice().get(k).copied().unwrap_or(f32::NAN);
+            assert!(same(&told[name], ours), "{name}: {told}, {ours}");
+        }
+        let names =
+            ["limited_by_torque", "limited_by_slew", "limited_by_lower_stop", "limited_by_upper_stop"];
+        for (limit, name) in Limit::ALL.into_iter().zip(names) {
+            let limited = record.limiting.as_slice().get(k).is_some_and(|limiting| limiting.contains(limit));
+            assert_eq!(told[name], limited);
+        }
+    }
+}
+
+#[test]
+fn python_reads_the_same_values() {
+    let (python, packages) = match python() {
+        Ok(found) => found,
+        Err(problem) => {
+            eprintln!(
+                "SKIPPED, not passed: the Python packages mcap and mcap-protobuf-support can't be had: {problem}"
+            );
+            return;
+        }
+    };
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.mcap");
+    for finish in [true, false] {
+        let mut random = fastrand::Rng::with_seed(7);
+        let mut writer = Writer::create(&path, true).unwrap();
+        let names = ["three-finger", "two-finger"];
+        let devices = ["hand1", "hand2"].map(|name| writer.add_device(name));
+        let mut hands = names.map(|name| Hand::new(about(name).joint_names.len()));
+        for (k, name) in names.into_iter().enumerate() {
+            writer.about(devices[k], Stamp(0), &about(name)).unwrap();
+            writer.parameters(devices[k], Stamp(0), &settings(name)).unwrap();
+        }
+        for tick in 1..=700_u64 {
+            for k in 0..2 {
+                let (_, payload) = hands[k].tick(&mut random);
+                if random.u32(0..90) > 0 {
+                    let at = Stamp(1_000_000 * tick + random.u64(0..300_000));
+                    writer.received(devices[k], at, &payload).unwrap();
+                }
+            }
+        }
+        writer.checkpoint().unwrap();
+        if finish {
+            writer.finish().unwrap();
+        } else {
+            std::mem::forget(writer);
+        }
+        let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("../tests/python/read_recording.py");
+        let output =
+            Command::new(&python).arg(script).arg(&path).env("PYTHONPATH", &packages).output().unwrap();
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+        let told: Value = serde_json::from_slice(&output.stdout).unwrap();
+        assert_eq!(told["finished"], finish);
+        let (entries, _, recording) = read(&path);
+        let mut decoder = Decoder::new();
+        let decoded: Vec<Decoded> = entries.iter().filter_map(|entry| decoder.take(entry)).collect();
+        let mut compared = 0;
+        for (k, device) in recording.devices().iter().enumerate() {
+            let topic = format!("/{device}/tick");
+            let theirs: Vec<&Value> = told["ticks"]
+                .as_array()
+                .unwrap()
+                .iter()
+                .filter(|tick| tick["topic"] == topic.as_str())
+                .collect();
+            let ours: Vec<&Decoded> = decoded.iter().filter(|decoded| decoded.device == k).collect();
+            assert_eq!(theirs.len(), ours.len());
+            // Python gives messages by their time, which is that of the tick.
+            for (theirs, ours) in theirs.iter().zip(&ours) {
+                compare(theirs, ours, &about(names[k]).joint_names);
+                compared += 1;
+            }
+            let received =
+                entries.iter().filter(|e| e.device == k && matches!(e.what, What::Received(_))).count();
+            assert_eq!(told["counts"][format!("/{device}/received")].as_u64(), Some(received as u64));
+            assert_eq!(told["about"][k]["hand"], names[k]);
+            assert_eq!(told["about"][k]["hand_file"], about(names[k]).hand_file.unwrap());
+            for (theirs, ours) in
+                told["parameters"][k]["values"].as_array().unwrap().iter().zip(settings(names[k]))
+            {
+                assert_eq!(theirs["key"], ours.parameter.key());
+                assert!(ours.value.map_or(theirs["value"].is_null(), |value| same(&theirs["value"], value)));
+            }
+        }
+        assert!(compared > 1000, "{compared}");
+        // Units stand in the names, and in the table.
+        let units = |name: &str| {
+            told["signals"]["tick"].as_array().unwrap().iter().find(|row| row["name"] == name).unwrap()["unit"].clone()
+        };
+        assert_eq!(units("force_n"), "N");
+        assert_eq!(units("energy_j"), "J");
+        assert_eq!(units("joints.<joint>.angle_rad"), "rad");
+        assert_eq!(units("joints.<joint>.torque_nm"), "N m");
+        assert_eq!(told["metadata"]["interface_version"], "3");
+    }
+}

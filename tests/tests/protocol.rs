@@ -1,0 +1,822 @@
+//! `docs/protocol.md` and `tests/data/wire/vectors.json` say what the code does: what can be made from it is made here, and
+//! compared. With `BLINDGRASP_BLESS=1` both are written anew; look at the difference then, because a vector that changes
+//! is another interface version.
+//!
+//!     cargo test --release -p blindgrasp-tests --test protocol -- --show-output
+
+use blindgrasp::MAX_JOINTS;
+use blindgrasp::scene::HandModel;
+use blindgrasp_shared::command::{Answer, Command, Grasp, Refusal};
+use blindgrasp_shared::event::{Event, Events};
+use blindgrasp_shared::fault::{Fault, Raised, Reaction};
+use blindgrasp_shared::identity::{Clock, Crash, CrashKind, Identity, Image, ResetCause, UNITS};
+use blindgrasp_shared::limit::{Limit, Limiting};
+use blindgrasp_shared::link::message::{Packet, Reply, Request, Sample, Signals};
+use blindgrasp_shared::link::{FrameError, HearError, Heard, Listener, Receiver, Sender, encode, most_bytes};
+use blindgrasp_shared::settings::{Each, Parameter};
+use blindgrasp_shared::supervisor::{Event as ModeEvent, Mode, Outcome, outcome};
+use blindgrasp_shared::telemetry::snapshot::{PART_BYTES, Part};
+use blindgrasp_shared::telemetry::{INTERFACE_VERSION, List, Record, dense};
+use blindgrasp_shared::tick::{Input, Params, State, tick};
+use blindgrasp_tests::generated::{check, table};
+use blindgrasp_tests::images::root;
+use serde::ser::{Serialize, SerializeTuple, Serializer};
+use serde_json::json;
+use std::fmt::Write as _;
+use std::fs;
+
+const DOCUMENT: &str = "docs/protocol.md";
+const VECTORS: &str = "tests/data/wire/vectors.json";
+
+/// Capacity of everything here; the bytes do not depend on it.
+const J: usize = 16;
+/// Joints of the hand that the vectors are of.
+const JOINTS: usize = 12;
+/// Room for every payload here with its CRC.
+const ROOM: usize = 1024;
+
+type AnyRecord = Record<f32, J>;
+
+fn hex(bytes: &[u8]) -> String {
+    bytes.iter().fold(String::new(), |mut text, byte| {
+        let _ = write!(text, "{byte:02x}");
+        text
+    })
+}
+
+/// Bytes as they are.
+struct Raw<'a>(&'a [u8]);
+
+impl Serialize for Raw<'_> {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let mut tuple = serializer.serialize_tuple(self.0.len())?;
+        self.0.iter().try_for_each(|byte| tuple.serialize_element(byte))?;
+        tuple.end()
+    }
+}
+
+fn frame(message: &impl Serialize) -> Vec<u8> {
+    let mut buffer = [0; most_bytes(ROOM)];
+    encode(message, &mut buffer).expect("there is room").to_vec()
+}
+
+/// Nothing limits a joint.
+const NOTHING: &[Limit] = &[];
+
+/// What a receiver makes of a frame.
+fn received(frame: &[u8]) -> Result<Vec<u8>, FrameError> {
+    let mut receiver = Receiver::<ROOM>::new();
+    let (last, before) = frame.split_last().expect("there are bytes");
+    assert!(before.iter().all(|&byte| receiver.push(byte).is_none()));
+    receiver.push(*last).expect("this is the end of a frame").map(<[u8]>::to_vec)
+}
+
+fn payload(frame: &[u8]) -> Vec<u8> {
+    received(frame).expect("the frame is good")
+}
+
+// -------------------------------------------------------------------------------------------------- Examples of messages
+
+fn counts(values: &[i32]) -> List<i32, J> {
+    let mut items = [0; J];
+    items[..values.len()].copy_from_slice(values);
+    List::first_of(items, values.len())
+}
+
+fn torques(values: &[f32]) -> List<f32, J> {
+    let mut items = [0.0; J];
+    items[..values.len()].copy_from_slice(values);
+    List::first_of(items, values.len())
+}
+
+fn limiting(values: &[&[Limit]]) -> List<Limiting, J> {
+    let mut items = [Limiting::NONE; J];
+    for (item, limits) in items.iter_mut().zip(values) {
+        limits.iter().for_each(|&limit| item.insert(limit));
+    }
+    List::first_of(items, values.len())
+}
+
+/// Every request, and some of them more than once.
+fn packets() -> Vec<(&'static str, Packet<J>)> {
+    let grasp = Grasp { force_n: Some(3.5), attitude_stiffness_nm: None };
+    let at_rest: Vec<i32> = (0..JOINTS as i32).map(|k| 300 * k - 1500).collect();
+    let command = Request::Command;
+    let requests = [
+        ("hello", Request::Hello { interface_version: INTERFACE_VERSION }),
+        ("arm", command(Command::Arm)),
+        ("disarm", command(Command::Disarm)),
+        ("grasp as configured", command(Command::Grasp(Grasp::CONFIGURED))),
+        ("grasp with 3.5 N", command(Command::Grasp(grasp))),
+        ("release", command(Command::Release)),
+        ("stop", command(Command::Stop)),
+        ("clear fault", command(Command::ClearFault)),
+        ("heartbeat", Request::Heartbeat),
+        (
+            "set a torque limit",
+            Request::SetParameter { parameter: Parameter::TorqueLimit, index: 3, value: 0.25 },
+        ),
+        ("get the heartbeat's time", Request::GetParameter { parameter: Parameter::HeartbeatTime, index: 0 }),
+        ("telemetry at full rate, everything", Request::Telemetry { decimation: 1, signals: Signals::FULL }),
+        ("no telemetry", Request::Telemetry { decimation: 0, signals: Signals::NONE }),
+        (
+            "joints of the processor in the loop",
+            Request::Joints(Sample { counts: counts(&at_rest), failed: None, late: false }),
+        ),
+        (
+            "joints that can't be read",
+            Request::Joints(Sample {
+                counts: counts(&[]),
+                failed: Some(Raised::at(2, Fault::SampleMissing)),
+                late: true,
+            }),
+        ),
+        ("a record of the burst", Request::Burst { index: 191 }),
+    ];
+    let packet =
+        |k: usize, (name, request)| (name, Packet { session: 1, sequence: 0x1234 + k as u16, request });
+    requests.into_iter().enumerate().map(|(k, named)| packet(k, named)).collect()
+}
+
+/// The place of each request in the enum. A new one is missed here by the compiler.
+fn number(request: &Request<J>) -> usize {
+    match request {
+        Request::Hello { .. } => 0,
+        Request::Command(_) => 1,
+        Request::Heartbeat => 2,
+        Request::SetParameter { .. } => 3,
+        Request::GetParameter { .. } => 4,
+        Request::Telemetry { .. } => 5,
+        Request::Joints(_) => 6,
+        Request::Burst { .. } => 7,
+    }
+}
+
+const IDENTITY: Identity<'static> = Identity {
+    image: Image {
+        interface_version: INTERFACE_VERSION,
+        kind: "hand",
+        hand: "three-finger",
+        hand_hash: 0x2467_6c70,
+        firmware_version: "0.1.0",
+        build_hash: 0x25c4_2b05,
+        joint_count: 12,
+        fingertip_count: 3,
+        period_us: 1000,
+    },
+    units: UNITS,
+    clock: Clock::External,
+    reset: ResetCause::PowerOn,
+    crash: None,
+};
+
+/// A hand of three joints in a fault.
+fn faulted() -> AnyRecord {
+    Record {
+        sequence: 300,
+        tick: 70_000,
+        mode: Mode::Fault,
+        fault: Some(Raised::at(2, Fault::CountJump)),
+        answer: Some(Answer { command: Command::ClearFault, refused: Some(Refusal::FaultPersists) }),
+        events: Events::NONE.with(Event::Late, true),
+        reading_failed: Some(Raised::of_hand(Fault::SampleMissing)),
+        force_n: 5.0,
+        attitude_stiffness_nm: 0.005,
+        approach_potential_j: 0.25,
+        attitude_potential_j: 0.125,
+        energy_j: 0.0625,
+        cycles: 20_000,
+        late_ticks: 2,
+        dropped: 1,
+        decimation: 300,
+        counts: counts(&[0, -1, 21_600]),
+        torques_nm: torques(&[0.5, -1.25, 0.0]),
+        limiting: limiting(&[&[], &[Limit::Torque, Limit::UpperStop], &[]]),
+    }
+}
+
+/// A hand of twelve joints that grasps: record `k` of a stream with one in `decimation` ticks, whose joints turn by so
+/// many counts each. The numbers say nothing; they are made to be of the size that such numbers have.
+fn grasping(k: u32, decimation: u16, step: i32) -> AnyRecord {
+    let share = f32::from(k as u16) / 64.0;
+    let count = |joint: i32| {
+        (joint - 6).wrapping_mul(500).wrapping_add((k as i32).wrapping_mul(step * (joint % 5 - 2)))
+    };
+    Record {
+        sequence: 1000_u32.wrapping_add(k),
+        tick: 5000_u32.wrapping_add(k.wrapping_mul(u32::from(decimation))),
+        mode: Mode::Grasping,
+        fault: None,
+        answer: None,
+        events: Events::NONE.with(Event::Heartbeat, k % 50 == 3),
+        reading_failed: None,
+        force_n: 5.0 * share,
+        attitude_stiffness_nm: 0.005,
+        approach_potential_j: 0.2 - 0.1 * share,
+        attitude_potential_j: 0.001 * share,
+        energy_j: 0.002 + 0.003 * share,
+        cycles: 11_603 + k,
+        late_ticks: 0,
+        dropped: 0,
+        decimation,
+        counts: counts(&(0..JOINTS as i32).map(count).collect::<Vec<_>>()),
+        torques_nm: torques(&(0..JOINTS).map(|j| 0.3 * share - 0.01 * j as f32).collect::<Vec<_>>()),
+        limiting: limiting(&[NOTHING; JOINTS]),
+    }
+}
+
+/// Every reply.
+fn replies() -> Vec<(&'static str, Reply<'static, J>)> {
+    let answer = |refused| Reply::Answer { sequence: 0x1235, refused };
+    let crash = Crash {
+        kind: CrashKind::HardFault,
+        program_counter: 0x0800_1234,
+        link_register: 0x0800_4321,
+        line: 0,
+        file_hash: 0,
+    };
+    let clock = Clock::Fallback;
+    let after_a_crash = Identity { clock, reset: ResetCause::Software, crash: Some(crash), ..IDENTITY };
+    let mut bytes = [0; 64];
+    (0..).zip(&mut bytes).for_each(|(k, byte)| *byte = 3 * k);
+    let part = Part { tick: 5000, offset: 896, length: 903, bytes: List::first_of(bytes, 7) };
+    vec![
+        ("identity", Reply::Identity { sequence: 0x1234, session: 1, identity: IDENTITY }),
+        ("identity after a crash", Reply::Identity { sequence: 7, session: 2, identity: after_a_crash }),
+        ("done", answer(None)),
+        ("refused", answer(Some(Refusal::InFault))),
+        (
+            "value",
+            Reply::Value { sequence: 0x123e, parameter: Parameter::HeartbeatTime, index: 0, value: 250.0 },
+        ),
+        ("record of three joints in a fault", Reply::Record(faulted())),
+        ("record of twelve joints", Reply::Record(grasping(64, 1, 20))),
+        ("record of a burst", Reply::Burst { sequence: 0x1243, index: 191, count: 256, record: faulted() }),
+        ("last part of a snapshot", Reply::Snapshot(part)),
+    ]
+}
+
+// ------------------------------------------------------------------------------------------------------------ Vectors
+
+fn messages() -> Vec<serde_json::Value> {
+    let vector = |name: &str, from: &str, message: serde_json::Value, frame: &[u8]| {
+        json!({
+            "name": name, "from": from, "message": message, "payload": hex(&payload(frame)), "frame": hex(frame)
+        })
+    };
+    let mut vectors = Vec::new();
+    for (name, packet) in packets() {
+        let frame = frame(&packet);
+        assert_eq!(Packet::decode(&payload(&frame)), Ok(packet.clone()), "{name}");
+        vectors.push(vector(name, "host", json!(packet), &frame));
+    }
+    for (name, reply) in replies() {
+        let frame = frame(&reply);
+        assert_eq!(Reply::decode(&payload(&frame)), Ok(reply.clone()), "{name}");
+        vectors.push(vector(name, "device", json!(reply), &frame));
+    }
+    vectors
+}
+
+/// Payloads whose stuffing is at one of its edges.
+fn stuffed() -> Vec<serde_json::Value> {
+    let run = |bytes: usize| (0..bytes).map(|k| (k % 255) as u8 + 1).collect::<Vec<u8>>();
+    let mut payloads = vec![
+        ("no payload".to_owned(), vec![]),
+        ("a zero".to_owned(), vec![0]),
+        ("zeros".to_owned(), vec![0; 5]),
+        ("a zero at each end".to_owned(), vec![0, 1, 2, 0]),
+        ("zeros in the middle".to_owned(), vec![7, 0, 0, 0, 0, 8]),
+        ("ff ff ff ff and zeros".to_owned(), [[0xff; 4], [0; 4]].concat()),
+        ("300 zeros".to_owned(), vec![0; 300]),
+    ];
+    // With the CRC, blocks of 254 bytes end with them, before them, and after them.
+    for bytes in [249, 250, 251, 253, 254, 255, 504, 508, 509] {
+        payloads.push((format!("{bytes} bytes without a zero"), run(bytes)));
+    }
+    for bytes in [253, 254, 255] {
+        payloads.push((format!("{bytes} bytes and a zero"), [run(bytes), vec![0]].concat()));
+        payloads.push((format!("a zero and {bytes} bytes"), [vec![0], run(bytes)].concat()));
+    }
+    let vector = |(name, bytes): (String, Vec<u8>)| {
+        let frame = frame(&Raw(&bytes));
+        assert_eq!(payload(&frame), bytes, "{name}");
+        json!({ "name": name, "payload": hex(&bytes), "frame": hex(&frame) })
+    };
+    payloads.into_iter().map(vector).collect()
+}
+
+/// Frames that are taken although [`encode`] writes them otherwise.
+fn also_good() -> Vec<serde_json::Value> {
+    // A payload that makes, with its CRC, one block of 254 bytes.
+    let bytes = (1..=u8::MAX).cycle().take(250).collect::<Vec<u8>>();
+    let mut with_empty_block = frame(&Raw(&bytes));
+    assert_eq!(with_empty_block.len(), 256, "no zero is in the CRC");
+    with_empty_block.insert(255, 1);
+    assert_eq!(payload(&with_empty_block), bytes);
+    vec![json!({
+        "name": "an empty last block after a full one", "payload": hex(&bytes), "frame": hex(&with_empty_block)
+    })]
+}
+
+fn damaged() -> Vec<serde_json::Value> {
+    let good = frame(&packets()[1].1);
+    let changed = |at: usize, to: u8| {
+        let mut frame = good.clone();
+        assert!(frame[at] != to && to != 0);
+        frame[at] = to;
+        frame
+    };
+    let without = |at: usize| {
+        let mut frame = good.clone();
+        frame.remove(at);
+        frame
+    };
+    let plain_crc = {
+        // That of zlib without the ten bytes: of nothing it is 0.
+        vec![1, 1, 1, 1, 1, 0]
+    };
+    let zeros = frame(&Raw(&[0; 5]));
+    let frames = [
+        ("a flipped bit in the payload", changed(2, good[2] ^ 0x10), FrameError::BadCrc),
+        ("a flipped bit in the CRC", changed(good.len() - 2, good[good.len() - 2] ^ 1), FrameError::BadCrc),
+        ("a byte too few", without(2), FrameError::BadCode),
+        ("a code that is too large", changed(0, 200), FrameError::BadCode),
+        ("a code that is too small", changed(0, good[0] - 1), FrameError::BadCrc),
+        ("the beginning of a frame", [&good[..4], &[0]].concat(), FrameError::BadCode),
+        ("three bytes", vec![4, 1, 2, 3, 0], FrameError::TooShort),
+        ("a code alone", vec![1, 0], FrameError::TooShort),
+        ("zeros with the CRC of zlib", plain_crc, FrameError::BadCrc),
+        ("a lost zero", zeros[1..].to_vec(), FrameError::BadCrc),
+        (
+            "two frames without a 0x00 between them",
+            [&good[..good.len() - 1], &good].concat(),
+            FrameError::BadCrc,
+        ),
+    ];
+    let vector = |(name, frame, why): (&str, Vec<u8>, FrameError)| {
+        let seen = received(&frame);
+        assert_eq!(seen, Err(why), "{name}");
+        json!({ "name": name, "frame": hex(&frame), "why": format!("{why:?}") })
+    };
+    frames.into_iter().map(vector).collect()
+}
+
+/// Payloads that came as they were sent, and are no messages.
+fn malformed() -> Vec<serde_json::Value> {
+    let heartbeat = payload(&frame(&packets()[8].1));
+    let identity = payload(&frame(&replies()[0].1));
+    let from_host = [
+        ("nothing", vec![]),
+        ("a request of a later version", vec![1, 1, 0x7f]),
+        ("a session above 65535", vec![0xff, 0xff, 0x04, 1, 2]),
+        ("a number that does not end", vec![0xff, 0xff, 0xff, 0xff, 2]),
+        ("a byte too many", [&heartbeat[..], &[0]].concat()),
+        ("no request", heartbeat[..heartbeat.len() - 1].to_vec()),
+        ("a command of a later version", vec![1, 1, 1, 6]),
+        ("an option that is neither", vec![1, 1, 1, 2, 2, 0]),
+        ("a bool that is neither", vec![1, 1, 6, 0, 0, 2]),
+        ("a fault of a later version", vec![1, 1, 6, 0, 1, 200, 0, 0]),
+    ];
+    let mut not_text = identity.clone();
+    not_text[5] = 0xff;
+    let from_device = [
+        ("a reply of a later version", vec![0x7f, 1, 0]),
+        ("a refusal of a later version", vec![1, 1, 1, 0x7f]),
+        ("a text that is not UTF-8", not_text),
+        ("an identity that ends too early", identity[..identity.len() - 1].to_vec()),
+    ];
+    let mut vectors = Vec::new();
+    for (name, payload) in from_host {
+        assert!(Packet::<J>::decode(&payload).is_err(), "{name}");
+        vectors.push(json!({ "name": name, "from": "host", "payload": hex(&payload) }));
+    }
+    for (name, payload) in from_device {
+        assert!(Reply::<J>::decode(&payload).is_err(), "{name}");
+        vectors.push(json!({ "name": name, "from": "device", "payload": hex(&payload) }));
+    }
+    vectors
+}
+
+/// A stream of records as it was sent, and what of it comes to a listener.
+struct Stream {
+    sender: Sender<J>,
+    listener: Listener<J>,
+    signals: Signals,
+    steps: Vec<serde_json::Value>,
+}
+
+impl Stream {
+    fn new(signals: Signals) -> Self {
+        Self { sender: Sender::new(), listener: Listener::new(), signals, steps: Vec::new() }
+    }
+
+    /// The payload that a record is sent as.
+    fn send(&mut self, record: &AnyRecord) -> Vec<u8> {
+        let mut buffer = [0; most_bytes(ROOM)];
+        payload(self.sender.record(record, self.signals, &mut buffer).expect("there is room"))
+    }
+
+    /// Sends a record that is lost.
+    fn lose(&mut self, record: &AnyRecord) {
+        self.send(record);
+    }
+
+    /// Sends a record that arrives: whether it was sent dense, and the record that is heard, or why none is.
+    fn arrive(&mut self, record: &AnyRecord) -> Result<bool, HearError> {
+        let payload = self.send(record);
+        let is_dense = payload[0] == dense::TAG;
+        let heard = self.hear(&payload)?;
+        let mut kept = record.clone();
+        kept.keep(self.signals);
+        assert_eq!(heard, if is_dense { dense::quantised(&kept) } else { kept });
+        Ok(is_dense)
+    }
+
+    /// Takes a payload, and notes what came of it.
+    fn hear(&mut self, payload: &[u8]) -> Result<AnyRecord, HearError> {
+        let heard = self.listener.hear(payload);
+        let noted = match &heard {
+            Ok(Heard { reply: Reply::Record(record), digest }) => {
+                json!({ "record": record, "digest": digest })
+            }
+            Ok(other) => panic!("{other:?}"),
+            Err(error) => json!(format!("{error:?}")),
+        };
+        self.steps.push(json!({ "payload": hex(payload), "heard": noted }));
+        match heard?.reply {
+            Reply::Record(record) => Ok(record),
+            other => panic!("{other:?}"),
+        }
+    }
+
+    fn vector(self, name: &str) -> serde_json::Value {
+        json!({ "name": name, "steps": self.steps })
+    }
+}
+
+const DENSE: Signals = Signals::ALL.and(Signals::DENSE);
+
+fn streams() -> Vec<serde_json::Value> {
+    let mut vectors = Vec::new();
+
+    let mut stream = Stream::new(DENSE);
+    assert_eq!(stream.arrive(&grasping(0, 1, 3)), Ok(false), "the first is whole");
+    // A sender takes many bits until it knows how fast the counts change.
+    for k in 1..12 {
+        assert_eq!(stream.arrive(&grasping(k, 1, 3)), Ok(true));
+    }
+    vectors.push(stream.vector("a full record and dense ones"));
+
+    let mut stream = Stream::new(DENSE);
+    (0..12).for_each(|k| assert!(stream.arrive(&grasping(k, 1, 3)).is_ok()));
+    stream.lose(&grasping(12, 1, 3));
+    assert_eq!(stream.arrive(&grasping(13, 1, 3)), Ok(true), "one that was lost costs itself only");
+    (14..21).for_each(|k| stream.lose(&grasping(k, 1, 3)));
+    assert_eq!(stream.arrive(&grasping(21, 1, 3)), Ok(true), "seven that were lost, too");
+    (22..30).for_each(|k| stream.lose(&grasping(k, 1, 3)));
+    assert_eq!(stream.arrive(&grasping(30, 1, 3)), Err(HearError::Lost), "eight are too many");
+    assert_eq!(stream.arrive(&grasping(31, 1, 3)), Err(HearError::Lost));
+    let answer = Some(Answer { command: Command::Release, refused: None });
+    assert_eq!(
+        stream.arrive(&Record { answer, ..grasping(32, 1, 3) }),
+        Ok(false),
+        "an answer needs a full one"
+    );
+    assert_eq!(stream.arrive(&grasping(33, 1, 3)), Ok(true));
+    vectors.push(stream.vector("lost records, recovered and not"));
+
+    let mut stream = Stream::new(DENSE);
+    stream.lose(&grasping(0, 1, 3));
+    assert_eq!(stream.arrive(&grasping(1, 1, 3)), Err(HearError::NoFullRecord));
+    vectors.push(stream.vector("a dense record without a full one before it"));
+
+    let mut stream = Stream::new(DENSE);
+    for k in 0..4 {
+        assert!(stream.arrive(&grasping(k, 1, 3)).is_ok());
+    }
+    let mut wrong = stream.send(&grasping(4, 1, 3));
+    let check_at = wrong.len() - 3;
+    wrong[check_at] ^= 0x40;
+    assert_eq!(stream.hear(&wrong), Err(HearError::Lost));
+    assert_eq!(
+        stream.arrive(&grasping(5, 1, 3)),
+        Err(HearError::Lost),
+        "it stays so until the next full one"
+    );
+    vectors.push(stream.vector("a wrong check"));
+
+    let mut stream = Stream::new(DENSE);
+    let joint = Some(Raised::at(4, Fault::Overspeed));
+    let fault = |k| Record { mode: Mode::Fault, fault: joint, ..grasping(k, 1, 3) };
+    let unread = Record {
+        fault: Some(Raised::of_hand(Fault::LinkLost)),
+        reading_failed: Some(Raised::at(11, Fault::SampleMissing)),
+        counts: counts(&[]),
+        ..fault(2)
+    };
+    let mut limits: Vec<&[Limit]> = vec![&[]; JOINTS];
+    limits[0] = &[Limit::Slew];
+    limits[11] = &[Limit::Torque, Limit::LowerStop];
+    for record in [
+        grasping(0, 1, 3),
+        fault(1),
+        unread,
+        Record { limiting: limiting(&limits), late_ticks: 3, dropped: 9, ..grasping(3, 1, 3) },
+        Record {
+            late_ticks: 14,
+            dropped: 9,
+            events: Events::NONE.with(Event::Late, true),
+            ..grasping(4, 1, 3)
+        },
+    ] {
+        stream.arrive(&record).expect("nothing was lost");
+    }
+    vectors.push(stream.vector("faults, limits, a reading that failed, late ticks"));
+
+    for (step, name) in [(40, "counts that change fast"), (3000, "counts that change very fast")] {
+        let mut stream = Stream::new(DENSE);
+        (0..3).for_each(|k| assert!(stream.arrive(&grasping(k, 1, step)).is_ok()));
+        vectors.push(stream.vector(name));
+    }
+
+    let mut stream = Stream::new(DENSE);
+    for k in 0..4_u32 {
+        let near_the_end = |value: u32| value.wrapping_add(k.wrapping_mul(3));
+        let record = grasping(k, 3, 5);
+        let mut wrapping = [0; J];
+        let beyond = i32::MAX - 7;
+        wrapping.iter_mut().for_each(|count| *count = beyond.wrapping_add(5 * k as i32));
+        let counts = List::first_of(wrapping, JOINTS);
+        let tick = near_the_end(u32::MAX - 4);
+        let sequence = (u32::MAX - 1).wrapping_add(k);
+        stream.arrive(&Record { sequence, tick, counts, ..record }).expect("nothing was lost");
+    }
+    vectors.push(stream.vector("one in three ticks; numbers and counts run over"));
+
+    let mut stream = Stream::new(DENSE);
+    let unread = |k| Record {
+        reading_failed: Some(Raised::at(0, Fault::SampleMissing)),
+        counts: counts(&[]),
+        ..grasping(k, 1, 3)
+    };
+    assert_eq!(stream.arrive(&grasping(0, 1, 3)), Ok(false));
+    (1..8).for_each(|k| assert_eq!(stream.arrive(&unread(k)), Ok(true)));
+    assert_eq!(stream.arrive(&grasping(8, 1, 3)), Ok(true), "counts of eight records ago will do");
+    (9..17).for_each(|k| assert_eq!(stream.arrive(&unread(k)), Ok(true)));
+    assert_eq!(stream.arrive(&grasping(17, 1, 3)), Ok(false), "those of nine will not");
+    vectors.push(stream.vector("readings that fail for long"));
+
+    let mut stream = Stream::new(DENSE);
+    (0..3).for_each(|k| assert!(stream.arrive(&grasping(k, 1, 3)).is_ok()));
+    stream.signals = Signals::TORQUES.and(Signals::DENSE);
+    (3..11).for_each(|k| assert_eq!(stream.arrive(&grasping(k, 1, 3)), Ok(false), "eight are whole"));
+    assert_eq!(stream.arrive(&grasping(11, 1, 3)), Ok(true));
+    vectors.push(stream.vector("other parts"));
+
+    let mut stream = Stream::new(Signals::COUNTS.and(Signals::DENSE));
+    (0..4).for_each(|k| assert!(stream.arrive(&grasping(k, 1, 3)).is_ok()));
+    vectors.push(stream.vector("counts alone"));
+    vectors
+}
+
+#[test]
+fn every_message_is_among_the_vectors() {
+    let mut requests: Vec<usize> = packets().iter().map(|(_, packet)| number(&packet.request)).collect();
+    requests.dedup();
+    assert_eq!(requests, (0..8).collect::<Vec<_>>());
+    let mut numbers: Vec<u8> = replies().iter().map(|(_, reply)| payload(&frame(reply))[0]).collect();
+    numbers.dedup();
+    assert_eq!(numbers, (0..dense::TAG).collect::<Vec<_>>());
+}
+
+#[test]
+fn the_vectors_are_those_of_the_code() {
+    let parts = [
+        ("messages", messages()),
+        ("frames", stuffed()),
+        ("also_good", also_good()),
+        ("damaged_frames", damaged()),
+        ("malformed", malformed()),
+        ("streams", streams()),
+    ];
+    let mut text = format!("{{\n\"interface_version\": {INTERFACE_VERSION}");
+    for (name, vectors) in &parts {
+        // A line each, so that a difference is seen as what it is.
+        let lines: Vec<String> = vectors.iter().map(ToString::to_string).collect();
+        let _ = write!(text, ",\n\"{name}\": [\n{}\n]", lines.join(",\n"));
+    }
+    text += "\n}\n";
+    let path = root().join(VECTORS);
+    if std::env::var("BLINDGRASP_BLESS").is_ok_and(|bless| bless == "1") {
+        fs::write(&path, &text).unwrap_or_else(|error| panic!("{VECTORS}: {error}"));
+    }
+    let there = fs::read_to_string(&path).unwrap_or_else(|error| panic!("{VECTORS}: {error}"));
+    let differ = text.lines().zip(there.lines()).find(|(new, old)| new != old);
+    assert!(
+        text == there,
+        "{VECTORS} is not what the code does:\n{differ:#?}\nthis is another interface version: raise it, and then run this \
+         test with BLINDGRASP_BLESS=1"
+    );
+}
+
+// ----------------------------------------------------------------------------------------------------------- Document
+
+/// What a unit variant is called and has as its number.
+fn numbered<T: std::fmt::Debug>(values: &[T], words: impl Fn(&T) -> &'static str) -> Vec<[String; 3]> {
+    let row = |(k, value): (usize, &T)| [k.to_string(), format!("`{value:?}`"), words(value).to_owned()];
+    values.iter().enumerate().map(row).collect()
+}
+
+#[test]
+fn the_tables_of_the_document_are_those_of_the_code() {
+    let three = ["number", "name", "meaning"];
+    let commands: Vec<[String; 3]> = (0..)
+        .zip(Command::ALL)
+        .map(|(k, command): (usize, _)| {
+            let fields = match command {
+                Command::Grasp(_) => "`force_n`: option of f32; `attitude_stiffness_nm`: option of f32",
+                _ => "",
+            };
+            assert_eq!(payload(&frame(&command))[0], k as u8);
+            [k.to_string(), command.words().to_owned(), fields.to_owned()]
+        })
+        .collect();
+    check(DOCUMENT, "commands", &table(["number", "command", "fields"], &commands));
+    check(DOCUMENT, "refusals", &table(three, &numbered(Refusal::ALL, |refusal| refusal.words())));
+    check(DOCUMENT, "modes", &table(three, &numbered(&Mode::ALL, |mode| mode.words())));
+    let faults: Vec<[String; 4]> = Fault::ALL
+        .iter()
+        .map(|fault| {
+            let done = match fault.reaction() {
+                Reaction::TorqueOff => "torque off",
+                Reaction::Release => "lets go, then torque off",
+            };
+            [fault.number().to_string(), format!("`{fault:?}`"), fault.words().into(), done.into()]
+        })
+        .collect();
+    check(DOCUMENT, "faults", &table(["number", "name", "what is wrong", "what is done"], &faults));
+    let parameters: Vec<[String; 5]> = (0..)
+        .zip(Parameter::ALL)
+        .map(|(k, parameter): (usize, _)| {
+            let each = match parameter.each() {
+                Each::Hand => "0",
+                Each::Joint => "joint",
+                Each::Axis => "axis: x, y, z",
+            };
+            let name = format!("`{parameter:?}`");
+            [k.to_string(), name, format!("`{}`", parameter.key()), each.into(), parameter.words().into()]
+        })
+        .collect();
+    check(DOCUMENT, "parameters", &table(["number", "name", "key", "index", "meaning"], &parameters));
+    let bits: Vec<[String; 2]> =
+        Limit::ALL.map(|limit| [(limit as u8).to_string(), limit.words().to_owned()]).into();
+    check(DOCUMENT, "limits", &table(["bit", "what limits the joint"], &bits));
+    let bits: Vec<[String; 2]> =
+        Event::ALL.map(|event| [(event as u8).to_string(), event.words().to_owned()]).into();
+    check(DOCUMENT, "events", &table(["bit", "what happened"], &bits));
+    let clocks = [Clock::External, Clock::Fallback, Clock::Emulated];
+    check(DOCUMENT, "clocks", &table(three, &numbered(&clocks, |clock| clock.words())));
+    let causes = [
+        ResetCause::PowerOn,
+        ResetCause::BrownOut,
+        ResetCause::Pin,
+        ResetCause::Software,
+        ResetCause::IndependentWatchdog,
+        ResetCause::WindowWatchdog,
+        ResetCause::LowPower,
+        ResetCause::Unknown,
+    ];
+    check(DOCUMENT, "resets", &table(three, &numbered(&causes, |cause| cause.words())));
+}
+
+#[test]
+fn the_table_of_modes_is_that_of_the_code() {
+    let rows = Mode::ALL.map(|mode| {
+        let events =
+            Command::ALL.into_iter().map(ModeEvent::Command).chain([ModeEvent::Fault, ModeEvent::Released]);
+        let cells = events.map(|event| match outcome(mode, event) {
+            Outcome::Enter(next) if next == mode => "stays".to_owned(),
+            Outcome::Enter(next) => format!("**{}**", next.words()),
+            Outcome::Refuse(refusal) => format!("refused: `{refusal:?}`"),
+        });
+        let cells: Vec<String> = std::iter::once(mode.words().to_owned()).chain(cells).collect();
+        <[String; 9]>::try_from(cells).expect("six commands and two more")
+    });
+    let head =
+        ["mode", "arm", "disarm", "grasp", "release", "stop", "clear fault", "*a fault*", "*release over*"];
+    check(DOCUMENT, "table of modes", &table(head, &rows));
+}
+
+#[test]
+fn the_examples_of_the_document_are_those_of_the_code() {
+    let find = |name: &str| {
+        let named = messages().into_iter().find(|vector| vector["name"] == name);
+        named.unwrap_or_else(|| panic!("there is no vector {name}"))
+    };
+    let mut text = String::new();
+    for name in
+        ["hello", "identity", "arm", "refused", "grasp with 3.5 N", "record of three joints in a fault"]
+    {
+        let vector = find(name);
+        let words = |key: &str| vector[key].as_str().expect("a text").to_owned();
+        let _ = write!(
+            text,
+            "\n*{name}*\n\n```text\nmessage  {}\npayload  {}\nframe    {}\n```\n",
+            vector["message"],
+            words("payload"),
+            words("frame")
+        );
+    }
+    check(DOCUMENT, "examples", &text);
+}
+
+/// Bytes a second of a line of 1 Mbaud with 8 bits, a start bit and a stop bit.
+const LINE_BYTES_S: f64 = 1e6 / 10.0;
+
+/// Bytes on the wire of the parts of a snapshot of the paper's hand, while it grasps.
+fn snapshot_frames() -> Vec<usize> {
+    let model = HandModel::load("three-finger").expect("it is built in");
+    let params = Params::new(model.hand.cast(), &model.config).expect("it is a hand");
+    let mut state = State::new();
+    for command in [Command::Arm, Command::Grasp(Grasp::CONFIGURED)] {
+        let input = Input::counts(&[0; MAX_JOINTS], Some(command));
+        let output = tick(&params, &mut state, &input.with(Events::NONE.with(Event::Heartbeat, true)));
+        assert_eq!(output.record.answer, Some(Answer { command, refused: None }));
+    }
+    let mut buffer = [0; 8192];
+    let saved = state.save(&params, &mut buffer).expect("there is room");
+    let length = saved.len() as u16;
+    let part = |(k, bytes): (usize, &[u8])| {
+        let mut items = [0; PART_BYTES];
+        items[..bytes.len()].copy_from_slice(bytes);
+        let offset = (k * PART_BYTES) as u16;
+        // A tick that takes as many bytes as it ever does.
+        let part = Part { tick: u32::MAX, offset, length, bytes: List::first_of(items, bytes.len()) };
+        frame(&Reply::<J>::Snapshot(part)).len()
+    };
+    saved.chunks(PART_BYTES).enumerate().map(part).collect()
+}
+
+#[test]
+fn the_budget_of_the_document_is_that_of_the_code() {
+    /// Bytes on the wire of a record in the dense form, after many like it.
+    fn dense_bytes(record: impl Fn(u32) -> AnyRecord) -> usize {
+        let mut sender = Sender::<J>::new();
+        let mut buffer = [0; most_bytes(ROOM)];
+        let mut bytes = 0;
+        for k in 0..64 {
+            let frame = sender.record(&record(k), DENSE, &mut buffer).expect("there is room");
+            assert_eq!(payload(frame)[0] == dense::TAG, k > 0);
+            bytes = frame.len();
+        }
+        bytes
+    }
+    // Counts a turn of the paper's hand; the largest change of a count in a tick that each number of bits allows.
+    let rad_s = |change: i32| f64::from(change) * 2.0 * std::f64::consts::PI / 21_600.0 / 1e-3;
+    // `grasping` turns its joints by 2, 1, 0, -1 and -2 steps.
+    let turning = |change: i32| move |k: u32| grasping(k, 1, change / 2);
+    let limited = move |k: u32| {
+        let all: &[Limit] = &[Limit::Torque];
+        Record { limiting: limiting(&[all; JOINTS]), ..grasping(k, 1, 254 / 2) }
+    };
+    let worst = move |k: u32| {
+        let all: &[Limit] = &[Limit::Torque];
+        let raised = Some(Raised::at(3, Fault::Overspeed));
+        Record { limiting: limiting(&[all; JOINTS]), fault: raised, ..grasping(k, 1, 4094 / 2) }
+    };
+    let full = frame(&Reply::Record(grasping(64, 1, 20))).len();
+    let snapshot = snapshot_frames();
+    let snapshot_bytes: usize = snapshot.iter().sum();
+    let mut rows = Vec::new();
+    let mut row = |what: String, bytes: f64| {
+        // Of 100 bytes a tick, so that it is a percentage as well.
+        assert!((LINE_BYTES_S / 1000.0 - 100.0).abs() < 1e-9);
+        rows.push([what, format!("{:.1}", bytes).trim_end_matches(".0").to_owned(), format!("{bytes:.0} %")]);
+        bytes
+    };
+    let [at_rest, slow, fast] = [0, 14, 254].map(|change| dense_bytes(turning(change)) as f64);
+    let is_within =
+        |bytes: f64| assert!(bytes <= 80.0, "{bytes} bytes a tick leave less than a fifth of the line");
+    is_within(row("dense, at rest".into(), at_rest));
+    is_within(row(format!("dense, joints turn by up to 14 counts ({:.1} rad/s)", rad_s(14)), slow));
+    is_within(row(format!("dense, up to 254 counts ({:.0} rad/s)", rad_s(254)), fast));
+    is_within(row("the same, a joint is limited".into(), dense_bytes(limited) as f64));
+    row(
+        format!("dense, up to 4094 counts ({:.0} rad/s), limits and a fault", rad_s(4094)),
+        dense_bytes(worst) as f64,
+    );
+    row("full, of a grasp".into(), full as f64);
+    row("full, the longest there can be".into(), most_bytes(1 + Record::<f32, JOINTS>::MOST_BYTES) as f64);
+    let words =
+        format!("snapshots of a grasp: {} frames, {snapshot_bytes} bytes every 1000 ticks", snapshot.len());
+    let snapshots = row(words, snapshot_bytes as f64 / 1000.0);
+    let stream = |dense: f64| (99.0 * dense + full as f64) / 100.0 + snapshots;
+    is_within(row("all of it on average, at rest".into(), stream(at_rest)));
+    is_within(row(format!("all of it on average, at {:.0} rad/s", rad_s(254)), stream(fast)));
+    let parts = snapshot[0] as f64 / 4.0;
+    let words =
+        format!("while a snapshot is sent ({} ticks), at {:.0} rad/s", 4 * snapshot.len(), rad_s(254));
+    row(words, fast + parts);
+    check(DOCUMENT, "budget", &table(["of 12 joints", "bytes a tick", "of 1 Mbaud"], &rows));
+}
