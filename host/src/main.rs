@@ -3,6 +3,7 @@
 mod commands;
 
 use clap::{Parser, Subcommand};
+use std::io::{self, Write as _};
 use std::process::ExitCode;
 
 /// Blind grasping of polyhedral objects with a multi-fingered, torque-controlled hand
@@ -44,7 +45,8 @@ fn main() -> ExitCode {
         Ok(commands::Outcome::Shown) => ExitCode::SUCCESS,
         Ok(commands::Outcome::Failed) => ExitCode::from(1),
         Err(error) => {
-            eprintln!("blindgrasp: {error:#}");
+            // A terminal may be gone: nobody to tell, and no reason to panic.
+            let _ = writeln!(io::stderr(), "blindgrasp: {error:#}");
             ExitCode::from(2)
         }
     }

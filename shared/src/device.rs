@@ -294,9 +294,7 @@ impl Telemetry {
     /// What is asked for from now on.
     fn begin(&mut self, decimation: u16, signals: Signals) {
         let Self { sent, dropped, .. } = *self;
-        // The first loss is acted on at once.
-        let chosen = ADAPT_EVERY_TICKS;
-        *self = Self { asked: decimation, decimation, signals, sent, dropped, chosen, ..Self::OFF };
+        *self = Self { asked: decimation, decimation, signals, sent, dropped, ..Self::OFF };
     }
 
     /// Sends less when the line does not take it all.

@@ -204,6 +204,7 @@ fn what_has_no_base_is_told_and_heard_again_from_the_next_full_record_on() {
     assert_eq!(listener.hear(&payloads[2 * WINDOW + 2]), Err(HearError::Lost));
     assert!(listener.hear(&payloads[100]).is_ok());
     assert!(listener.hear(&payloads[101]).is_ok());
+    assert_eq!(listener.hear(&payloads[101]), Err(HearError::Lost), "the same once more");
 }
 
 /// How a record differs from the one before.

@@ -94,12 +94,12 @@ fn watch(port: &str, arguments: &Arguments) -> anyhow::Result<Outcome> {
     let mut terminal = Restored::new()?;
     let mut monitor = Monitor::new();
     let ended = monitor.watch(&mut terminal.0, &live, port, recording.as_ref());
-    drop(terminal);
     if ended.is_err() {
         // Whatever it was: nobody watches any more.
         live.ask(Command::Stop);
         wait_for_stop(&live);
     }
+    drop(terminal);
     live.close();
     let saved = recording.map(|recording| recording.finish()).transpose();
     if let (Some(path), Ok(Some(saved))) = (&arguments.out, &saved) {
@@ -179,8 +179,9 @@ impl Restored {
 
 impl Drop for Restored {
     fn drop(&mut self) {
+        // What can't be given back to a terminal that is gone is not worth a panic.
         let _ = self.0.show_cursor();
-        ratatui::restore();
+        let _ = ratatui::try_restore();
     }
 }
 
