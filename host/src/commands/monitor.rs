@@ -15,6 +15,7 @@ use clap::Args;
 use ratatui::DefaultTerminal;
 use ratatui::crossterm::event::{self, Event, KeyEventKind};
 use std::io::{self, IsTerminal as _};
+use std::mem::ManuallyDrop;
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicU32, Ordering};
 use std::time::{Duration, Instant};
@@ -156,8 +157,8 @@ fn wait_for_keys(time: Duration) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// A terminal that is given back as it was, whatever happens.
-struct Restored(DefaultTerminal);
+/// A terminal that is given back as it was, whatever happens. Its own drop panics where there is nothing left to print to.
+struct Restored(ManuallyDrop<DefaultTerminal>);
 
 impl Restored {
     fn new() -> anyhow::Result<Self> {
@@ -173,7 +174,7 @@ impl Restored {
                 }
             });
         });
-        Ok(Self(ratatui::try_init().context("cannot use this terminal")?))
+        Ok(Self(ManuallyDrop::new(ratatui::try_init().context("cannot use this terminal")?)))
     }
 }
 
