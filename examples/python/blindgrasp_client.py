@@ -512,7 +512,7 @@ class Replies:
 
     def __init__(self):
         self.last = None  # the record before
-        self.counts = []  # the last ones known
+        self.counts = (0, [])  # the last ones known, and in which record they were
         self.lost = False  # only a full record helps
 
     def decode(self, payload):
@@ -522,11 +522,17 @@ class Replies:
             return {"Record": record}, digest
         reply = REPLY.decode(payload)
         if "Record" in reply:
-            self.last, self.lost = reply["Record"], False
-            self.counts = self.last["counts"]
+            self.take(reply["Record"])
+            self.lost = False
         return reply, None
 
+    def take(self, record):
+        self.last = record
+        if record["counts"]:
+            self.counts = record["sequence"], record["counts"]
+
     def dense(self, body):
+        """What goes on from the record before; see "Decoding" in section 6."""
         if self.last is None:
             raise Unusable("NoFullRecord")
         if self.lost:
@@ -536,10 +542,17 @@ class Replies:
         mode, events, size = state & 7, state >> 3 & 7, parts & 15
         if state >> 6 or mode >= len(MODES) or size > 8:
             raise Malformed("a dense record with unknown bits")
-        joints = max(len(part) for part in (self.counts, last["torques_nm"], last["limiting"]))
+        sequence = not_below(last["sequence"], sequence, 8)
+        passed = (sequence - last["sequence"]) % 2**32
+        whole_tick = (last["tick"] + passed * last["decimation"]) % 2**32
+        counted_at, counts = self.counts
+        far = size and (sequence - counted_at) % 2**32 > WINDOW
+        if not 1 <= passed <= WINDOW or tick != whole_tick % 2**16 or far:
+            self.lost = True
+            raise Unusable("Lost")
         record = {
-            "sequence": not_below(last["sequence"], sequence, 8),
-            "tick": not_below(last["tick"], tick, 16),
+            "sequence": sequence,
+            "tick": whole_tick,
             "mode": MODES[mode],
             "fault": None,
             "answer": None,
@@ -559,23 +572,21 @@ class Replies:
                 fault, joint = Known(FAULTS).read(body), BYTE.read(body)
                 record[part] = {"fault": fault, "joint": None if joint == 255 else joint}
         if size:
-            low = nibbles(body.take((len(self.counts) * size + 1) // 2), size, len(self.counts))
-            record["counts"] = [nearest(*count, 4 * size) for count in zip(self.counts, low)]
+            low = nibbles(body.take((len(counts) * size + 1) // 2), size, len(counts))
+            record["counts"] = [nearest(*count, 4 * size) for count in zip(counts, low)]
         if parts & 64:
-            record["torques_nm"] = [half.read(body) for _ in range(joints)]
+            record["torques_nm"] = [half.read(body) for _ in last["torques_nm"]]
         if parts & 128:
+            joints = len(last["limiting"])
             record["limiting"] = nibbles(body.take((joints + 1) // 2), 1, joints)
         check, digest = struct.unpack("<BH", body.take(3))
         if body.at < len(body.data):
             raise Malformed("there are bytes after the record")
         numbers = [record[part] for part in ("sequence", "tick", "late_ticks", "dropped", "decimation")]
-        passed, ticks = ((record[part] - last[part]) % 2**32 for part in ("sequence", "tick"))
-        known = 1 <= passed <= WINDOW and ticks == passed * last["decimation"]
-        if not known or mix(numbers + record["counts"]) >> 24 != check:
+        if mix(numbers + record["counts"]) >> 24 != check:
             self.lost = True
             raise Unusable("Lost")
-        self.last = record
-        self.counts = record["counts"] or self.counts
+        self.take(record)
         return record, digest
 
 
@@ -807,7 +818,7 @@ class Session:
         }
 
 
-# --------------------------------------------------------------------------------- 7. The processor in the loop
+# --------------------------------------------------------------------------------- 8. The processor in the loop
 
 
 class Plant:

@@ -400,14 +400,14 @@ fn angles_of_a_recording_are_those_of_the_controller() {
 #[test]
 fn what_the_simulation_records_is_replayed() {
     let folder = tempfile::tempdir().unwrap();
-    let run = folder.path().join("run");
+    let path = folder.path().join("cube.mcap");
     let simulated = Process::new(env!("CARGO_BIN_EXE_blindgrasp"))
         .args(["sim", "cube", "--duration", "1.2", "--out"])
-        .arg(&run)
+        .arg(&path)
         .output()
         .unwrap();
     assert_eq!(simulated.status.code(), Some(0), "{}", String::from_utf8_lossy(&simulated.stderr));
-    let output = command(&run.join("recording.mcap"), &["--json"]);
+    let output = command(&path, &["--json"]);
     assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
     let json: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
     assert_eq!((&json["bits_differ"], &json["not_replayed"]), (&0.into(), &0.into()), "{json}");

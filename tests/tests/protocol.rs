@@ -554,6 +554,26 @@ fn streams() -> Vec<serde_json::Value> {
     }
     vectors.push(stream.vector("one in three ticks; numbers and counts run over"));
 
+    let mut stream = Stream::new(DENSE);
+    let unread = |k| Record {
+        reading_failed: Some(Raised::at(0, Fault::SampleMissing)),
+        counts: counts(&[]),
+        ..grasping(k, 1, 3)
+    };
+    assert_eq!(stream.arrive(&grasping(0, 1, 3)), Ok(false));
+    (1..8).for_each(|k| assert_eq!(stream.arrive(&unread(k)), Ok(true)));
+    assert_eq!(stream.arrive(&grasping(8, 1, 3)), Ok(true), "counts of eight records ago will do");
+    (9..17).for_each(|k| assert_eq!(stream.arrive(&unread(k)), Ok(true)));
+    assert_eq!(stream.arrive(&grasping(17, 1, 3)), Ok(false), "those of nine will not");
+    vectors.push(stream.vector("readings that fail for long"));
+
+    let mut stream = Stream::new(DENSE);
+    (0..3).for_each(|k| assert!(stream.arrive(&grasping(k, 1, 3)).is_ok()));
+    stream.signals = Signals::TORQUES.and(Signals::DENSE);
+    (3..11).for_each(|k| assert_eq!(stream.arrive(&grasping(k, 1, 3)), Ok(false), "eight are whole"));
+    assert_eq!(stream.arrive(&grasping(11, 1, 3)), Ok(true));
+    vectors.push(stream.vector("other parts"));
+
     let mut stream = Stream::new(Signals::COUNTS.and(Signals::DENSE));
     (0..4).for_each(|k| assert!(stream.arrive(&grasping(k, 1, 3)).is_ok()));
     vectors.push(stream.vector("counts alone"));

@@ -108,16 +108,13 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
         console.talk.ask(Request::Command(Command::Stop), now);
         let _ = line.send(&console.talk.outgoing(), now + SENDING);
     }
-    let whole = console.recorder.as_mut().map(|recorder| {
-        let finished = recorder.finish(Instant::now());
-        finished.map(|()| recorder.totals().is_whole())
-    });
+    let totals = console.recorder.as_mut().map(|recorder| recorder.finish(Instant::now()));
     if let (Some(recording), Some(path)) = (recording, &arguments.out) {
         let saved = recording.finish()?;
         eprintln!("blindgrasp: recorded {}: {saved}", path.display());
     }
     ended?;
-    let whole = whole.transpose()?.unwrap_or(true);
+    let whole = totals.transpose()?.is_none_or(|totals| totals.is_whole());
     if !whole {
         eprintln!("blindgrasp: something is missing in the recording, which says what");
     }

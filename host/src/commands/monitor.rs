@@ -23,6 +23,8 @@ use std::time::{Duration, Instant};
 const FRAME: Duration = Duration::from_millis(40);
 /// How long a stop before the end may take: it is sent five times, 100 ms apart.
 const STOPPING: Duration = Duration::from_secs(1);
+/// Within this time a signal is seen, or the program ends without ceremony.
+const NOTICING: Duration = Duration::from_secs(5);
 /// Ticks from one recorded record to the next.
 const EVERY_TICK: u16 = 1;
 /// Times of the plots, s.
@@ -60,6 +62,8 @@ pub(crate) struct Arguments {
 
 /// Signals to end that came.
 static SIGNALS: AtomicU32 = AtomicU32::new(0);
+/// Those of them that were seen.
+static SEEN: AtomicU32 = AtomicU32::new(0);
 
 /// Runs the command.
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
@@ -125,6 +129,33 @@ fn refuse_without_terminal() -> anyhow::Result<()> {
     )
 }
 
+/// Waits until there may be keys. Here, because crossterm reads for ever from a terminal that is gone, while the heartbeat
+/// would go on.
+#[cfg(unix)]
+fn wait_for_keys(time: Duration) -> anyhow::Result<()> {
+    use nix::errno::Errno;
+    use nix::poll::{PollFd, PollFlags, PollTimeout, poll};
+    use std::os::fd::AsFd as _;
+    let input = io::stdin();
+    let mut input = [PollFd::new(input.as_fd(), PollFlags::POLLIN)];
+    match poll(&mut input, PollTimeout::try_from(time).unwrap_or(PollTimeout::ZERO)) {
+        Ok(_) | Err(Errno::EINTR) => {}
+        Err(error) => return Err(error).context("cannot wait for keys"),
+    }
+    let is_gone = PollFlags::POLLHUP | PollFlags::POLLERR | PollFlags::POLLNVAL;
+    if input[0].revents().is_some_and(|flags| flags.intersects(is_gone)) {
+        bail!("the terminal is gone");
+    }
+    Ok(())
+}
+
+/// Waits until there may be keys.
+#[cfg(not(unix))]
+fn wait_for_keys(time: Duration) -> anyhow::Result<()> {
+    event::poll(time).context("cannot wait for keys")?;
+    Ok(())
+}
+
 /// A terminal that is given back as it was, whatever happens.
 struct Restored(DefaultTerminal);
 
@@ -133,7 +164,14 @@ impl Restored {
         refuse_without_terminal()?;
         // Without the handler a signal ends the program; a hand then lets go for want of a heartbeat.
         let _ = ctrlc::set_handler(|| {
-            SIGNALS.fetch_add(1, Ordering::Relaxed);
+            let signals = SIGNALS.fetch_add(1, Ordering::Relaxed) + 1;
+            std::thread::spawn(move || {
+                std::thread::sleep(NOTICING);
+                // A heartbeat that nobody can end would hold the hand closed.
+                if SEEN.load(Ordering::Relaxed) < signals {
+                    std::process::exit(2);
+                }
+            });
         });
         Ok(Self(ratatui::try_init().context("cannot use this terminal")?))
     }
@@ -295,6 +333,7 @@ impl Monitor {
     /// Whether another signal to end came.
     fn signalled(&mut self) -> bool {
         let signals = SIGNALS.load(Ordering::Relaxed);
+        SEEN.store(signals, Ordering::Relaxed);
         std::mem::replace(&mut self.signals, signals) != signals
     }
 
@@ -323,19 +362,25 @@ impl Monitor {
     /// What a key of the next frame wants, as soon as it is pressed.
     fn intent(&mut self, frame: Duration, now: Duration) -> anyhow::Result<Option<Intent>> {
         let until = Instant::now() + frame;
-        while event::poll(until.saturating_duration_since(Instant::now())).context("cannot read the keys")? {
-            match event::read().context("cannot read the keys")? {
-                // Terminals that tell of keys that are let go would do everything twice.
-                Event::Key(key) if key.kind != KeyEventKind::Release => {
-                    if let Some(intent) = self.input.press(key, self.situation, now) {
-                        return Ok(Some(intent));
+        loop {
+            let left = until.saturating_duration_since(Instant::now());
+            wait_for_keys(left)?;
+            while event::poll(Duration::ZERO).context("cannot read the keys")? {
+                match event::read().context("cannot read the keys")? {
+                    // Terminals that tell of keys that are let go would do everything twice.
+                    Event::Key(key) if key.kind != KeyEventKind::Release => {
+                        if let Some(intent) = self.input.press(key, self.situation, now) {
+                            return Ok(Some(intent));
+                        }
                     }
+                    Event::Resize(..) => return Ok(None),
+                    _ => {}
                 }
-                Event::Resize(..) => return Ok(None),
-                _ => {}
+            }
+            if left.is_zero() {
+                return Ok(None);
             }
         }
-        Ok(None)
     }
 
     fn may_have_torque(&self) -> bool {

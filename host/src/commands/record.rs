@@ -357,7 +357,7 @@ impl Attendant<'_> {
     fn run(mut self, line: Box<dyn Transport + Send>) {
         let error = self.attend(line).err();
         let error = error.or_else(|| self.recorder.finish(Instant::now()).err().map(Trouble::File));
-        let end = Ended { totals: *self.recorder.totals(), gaps: self.gaps, error };
+        let end = Ended { totals: self.recorder.totals(), gaps: self.gaps, error };
         let _ = self.tell.send(News::End(self.k, end));
     }
 
@@ -431,8 +431,8 @@ impl Attendant<'_> {
             self.recorder.take(&event, talk, now)?;
             self.hear(&event, cut_at, now);
         }
-        if self.recorder.turn(talk, now)?.is_some() {
-            let _ = self.tell.send(News::Status(self.k, *self.recorder.totals()));
+        if self.recorder.turn(talk, now)? {
+            let _ = self.tell.send(News::Status(self.k, self.recorder.totals()));
         }
         line.send(&talk.outgoing(), now + SENDING)?;
         let deadline = talk.due().clamp(now + Duration::from_millis(1), now + SLICE);

@@ -15,7 +15,9 @@ use blindgrasp_shared::command::Refusal;
 use blindgrasp_shared::link::message::{Reply, Signals};
 use blindgrasp_shared::settings::{Each, Parameter};
 use std::path::Path;
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::mpsc::{self, Receiver, SyncSender};
+use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
+use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
 /// From one status of the link to the next.
@@ -29,10 +31,26 @@ const TRIES: u8 = 3;
 /// Payloads that were sent before a session, and are kept for it.
 const KEPT: usize = 8;
 
-/// A recording that several devices may share.
+/// Entries that may wait to be written: a minute of one hand. Beyond that, who brings more waits.
+const WAITING: usize = 1 << 16;
+
+/// Something to be written; none at the end.
+type Entry = Box<dyn FnOnce(&mut Writer) -> Result<(), RecordingError> + Send>;
+
+/// What the writing thread has to tell.
+#[derive(Default)]
+struct Told {
+    saved: Saved,
+    /// Why nothing is written any more, until somebody was told.
+    error: Option<RecordingError>,
+}
+
+/// A recording that several devices may share. A thread writes, so that a disk that takes its time does not keep those who
+/// read from their lines.
 #[derive(Clone)]
 pub struct Recording {
-    writer: Arc<Mutex<Option<Writer>>>,
+    thread: Arc<Mutex<Option<(SyncSender<Option<Entry>>, JoinHandle<Writer>)>>>,
+    told: Arc<Mutex<Told>>,
     /// The host's clock, which does not jump.
     begun: (Instant, Stamp),
 }
@@ -43,15 +61,23 @@ impl Recording {
     /// # Errors
     /// If it is there already, and not to be overwritten by `force`, or can't be made.
     pub fn create(path: &Path, force: bool) -> Result<Self, RecordingError> {
-        let writer = Arc::new(Mutex::new(Some(Writer::create(path, force)?)));
-        Ok(Self { writer, begun: (Instant::now(), Stamp::now()) })
+        let writer = Writer::create(path, force)?;
+        let told = Arc::new(Mutex::new(Told::default()));
+        let (sender, entries) = mpsc::sync_channel(WAITING);
+        let telling = Arc::clone(&told);
+        let thread = thread::spawn(move || write_down(writer, &entries, &telling));
+        let thread = Arc::new(Mutex::new(Some((sender, thread))));
+        Ok(Self { thread, told, begun: (Instant::now(), Stamp::now()) })
     }
 
     /// Adds a device, with whom nobody has spoken yet. `hands` are files that its hand may be found in.
     pub fn add(&self, name: &str, port: &str, hands: &[String], decimation: u16) -> Recorder {
-        let device = self.lock().as_mut().map(|writer| writer.add_device(name));
-        Recorder {
+        let device = Arc::new(OnceLock::new());
+        let (added, name) = (Arc::clone(&device), name.to_owned());
+        let entries = lock(&self.thread).as_ref().map(|(sender, _)| sender.clone());
+        let recorder = Recorder {
             recording: self.clone(),
+            entries,
             device,
             port: port.to_owned(),
             hands: hands.to_vec(),
@@ -64,32 +90,59 @@ impl Recording {
             changed: None,
             burst: None,
             status_due: None,
-            totals: Totals::default(),
-        }
+            totals: Arc::default(),
+        };
+        recorder.send(Box::new(move |writer| {
+            let _ = added.set(writer.add_device(&name));
+            Ok(())
+        }));
+        recorder
     }
 
-    /// What is in the file; nothing once it is finished.
+    /// What is in the file.
     pub fn saved(&self) -> Saved {
-        self.lock().as_ref().map_or(Saved::default(), Writer::saved)
+        lock(&self.told).saved
     }
 
-    /// Ends the file. Recorders can add nothing any more.
+    /// Ends the file, once everything is written that recorders have given. They can add nothing any more.
     ///
     /// # Errors
     /// If that can't be written.
     pub fn finish(&self) -> Result<Saved, RecordingError> {
-        let writer = self.lock().take();
-        writer.map_or(Ok(Saved::default()), Writer::finish)
-    }
-
-    fn lock(&self) -> MutexGuard<'_, Option<Writer>> {
-        self.writer.lock().unwrap_or_else(PoisonError::into_inner)
+        let Some((sender, thread)) = lock(&self.thread).take() else { return Ok(self.saved()) };
+        let _ = sender.send(None);
+        match thread.join() {
+            Ok(writer) => writer.finish(),
+            Err(_) => Ok(self.saved()),
+        }
     }
 
     fn stamp(&self, now: Instant) -> Stamp {
         let (begun, stamp) = self.begun;
         Stamp(stamp.0 + now.saturating_duration_since(begun).as_nanos() as u64)
     }
+}
+
+/// The writing thread.
+fn write_down(mut writer: Writer, entries: &Receiver<Option<Entry>>, told: &Mutex<Told>) -> Writer {
+    let mut has_stopped = false;
+    while let Ok(Some(entry)) = entries.recv() {
+        if has_stopped {
+            continue;
+        }
+        let written = entry(&mut writer);
+        let mut told = lock(told);
+        told.saved = writer.saved();
+        if let Err(error) = written {
+            told.error = Some(error);
+            has_stopped = true;
+        }
+    }
+    writer
+}
+
+fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 /// What became of a device's records.
@@ -154,7 +207,9 @@ struct Burst {
 /// Writes down what goes over the line to one device.
 pub struct Recorder {
     recording: Recording,
-    device: Option<Device>,
+    entries: Option<SyncSender<Option<Entry>>>,
+    /// Known to the writing thread.
+    device: Arc<OnceLock<Device>>,
     port: String,
     hands: Vec<String>,
     decimation: u16,
@@ -170,7 +225,7 @@ pub struct Recorder {
     changed: Option<Instant>,
     burst: Option<Burst>,
     status_due: Option<Instant>,
-    totals: Totals,
+    totals: Arc<Mutex<Totals>>,
 }
 
 impl Recorder {
@@ -180,8 +235,8 @@ impl Recorder {
     }
 
     /// What became of the records so far, to the last second.
-    pub fn totals(&self) -> &Totals {
-        &self.totals
+    pub fn totals(&self) -> Totals {
+        *lock(&self.totals)
     }
 
     /// Ticks from one record to the next that are asked for: whoever asks the device for records asks for these.
@@ -197,16 +252,18 @@ impl Recorder {
         match event {
             Event::Received(payload) if is_identity(payload) => payload.clone_into(&mut self.identity),
             Event::Received(payload) if self.phase != Phase::Nobody => {
-                self.write(now, |writer, device, at| writer.received(device, at, payload).map(|_| ()))?;
+                let payload = payload.clone();
+                self.write(now, move |writer, device, at| writer.received(device, at, &payload).map(|_| ()))?;
             }
             Event::Sent(payload) if self.phase != Phase::Nobody => {
-                self.write(now, |writer, device, at| writer.sent(device, at, payload))?;
+                let payload = payload.clone();
+                self.write(now, move |writer, device, at| writer.sent(device, at, &payload))?;
             }
             Event::Sent(payload) => {
                 self.kept.truncate(KEPT - 1);
                 self.kept.insert(0, payload.clone());
             }
-            Event::Damaged => self.write(now, |writer, device, _| {
+            Event::Damaged => self.write(now, move |writer, device, _| {
                 writer.damaged(device, 1);
                 Ok(())
             })?,
@@ -226,11 +283,11 @@ impl Recorder {
         Ok(())
     }
 
-    /// Does what is due. Returns what became of the link in the last second, once a second.
+    /// Does what is due. Returns, once a second, whether there is something new in [`Self::totals`].
     ///
     /// # Errors
     /// The recording has stopped.
-    pub fn turn(&mut self, talk: &mut Talk, now: Instant) -> Result<Option<LinkStatus>, RecordingError> {
+    pub fn turn(&mut self, talk: &mut Talk, now: Instant) -> Result<bool, RecordingError> {
         if self.changed.is_some_and(|due| due <= now) {
             self.changed = None;
             self.told_parameters(talk, now)?;
@@ -245,9 +302,10 @@ impl Recorder {
         }
         if self.status_due.is_some_and(|due| due <= now) {
             self.status_due = Some(now + STATUS);
-            return self.status(now).map(Some);
+            self.status(now)?;
+            return Ok(true);
         }
-        Ok(None)
+        Ok(false)
     }
 
     /// The link was cut: what comes after has no connexion with what came before.
@@ -261,30 +319,42 @@ impl Recorder {
         self.phase = Phase::Nobody;
         (self.changed, self.burst, self.status_due) = (None, None, None);
         self.kept.clear();
-        self.totals.gaps += 1;
+        lock(&self.totals).gaps += 1;
         self.status(now)?;
-        self.write(now, |writer, device, at| writer.gap(device, at, words))
+        let words = words.to_owned();
+        self.write(now, move |writer, device, at| writer.gap(device, at, &words))
     }
 
-    /// The last status of the link.
+    /// The last status of the link. Waits until all of it is written, and returns what became of the records.
     ///
     /// # Errors
     /// The recording has stopped.
-    pub fn finish(&mut self, now: Instant) -> Result<(), RecordingError> {
+    pub fn finish(&mut self, now: Instant) -> Result<Totals, RecordingError> {
         if self.phase != Phase::Nobody {
             self.status(now)?;
+            self.phase = Phase::Nobody;
         }
-        Ok(())
+        let (done, is_done) = mpsc::channel();
+        self.send(Box::new(move |_| {
+            let _ = done.send(());
+            Ok(())
+        }));
+        // It is not done, and dropped, where the recording has stopped.
+        let _ = is_done.recv();
+        self.entries = None;
+        match lock(&self.recording.told).error.take() {
+            Some(error) => Err(error),
+            None => Ok(self.totals()),
+        }
     }
 
-    fn status(&mut self, now: Instant) -> Result<LinkStatus, RecordingError> {
-        let mut status = LinkStatus::default();
-        self.write(now, |writer, device, at| {
-            status = writer.link(device, at)?;
+    fn status(&mut self, now: Instant) -> Result<(), RecordingError> {
+        let totals = Arc::clone(&self.totals);
+        self.write(now, move |writer, device, at| {
+            let status = writer.link(device, at)?;
+            lock(&totals).add(&status);
             Ok(())
-        })?;
-        self.totals.add(&status);
-        Ok(status)
+        })
     }
 
     fn open(&mut self, firmware: &Firmware, talk: &mut Talk, now: Instant) -> Result<(), RecordingError> {
@@ -300,11 +370,12 @@ impl Recorder {
         if let Some(file) = &hand {
             about = about.with_hand(file);
         }
-        self.totals.sessions += 1;
+        lock(&self.totals).sessions += 1;
         let kept = std::mem::take(&mut self.kept);
-        self.write(now, |writer, device, at| {
+        let is_known = hand.is_some();
+        self.write(now, move |writer, device, at| {
             writer.about(device, at, &about)?;
-            if hand.is_none() {
+            if !is_known {
                 let words = "the hand's file is not known: there are counts, but no angles";
                 writer.event(device, at, Level::Warning, words)?;
             }
@@ -351,9 +422,8 @@ impl Recorder {
 
     /// All parameters are known: they are written down, and records asked for, with a snapshot.
     fn told_parameters(&mut self, talk: &mut Talk, now: Instant) -> Result<(), RecordingError> {
-        let settings = std::mem::take(&mut self.settings);
-        self.write(now, |writer, device, at| writer.parameters(device, at, &settings))?;
-        self.settings = settings;
+        let settings = self.settings.clone();
+        self.write(now, move |writer, device, at| writer.parameters(device, at, &settings))?;
         self.phase = Phase::Telemetry;
         talk.ask_aside(self.telemetry(), now);
         Ok(())
@@ -385,16 +455,17 @@ impl Recorder {
                     }
                 }
             }
-            (Request::Telemetry { .. }, Some(Answer::Done)) => {
-                if self.phase == Phase::Telemetry {
-                    self.phase = Phase::Records;
-                }
+            (Request::Telemetry { .. }, Some(Answer::Done)) if self.phase == Phase::Telemetry => {
+                self.phase = Phase::Records;
             }
+            (Request::Telemetry { .. }, Some(Answer::Done)) => {}
             (Request::GetParameter { .. } | Request::Telemetry { .. }, _) => {
                 self.asked += 1;
                 if self.asked > TRIES * 2 {
                     let words = format!("no answer to {request:?}");
-                    self.write(now, |writer, device, at| writer.event(device, at, Level::Error, &words))?;
+                    self.write(now, move |writer, device, at| {
+                        writer.event(device, at, Level::Error, &words)
+                    })?;
                 } else {
                     talk.ask_aside(request.clone(), now);
                 }
@@ -432,18 +503,29 @@ impl Recorder {
             _ => format!("of the records around the fault, only {index} were read out: the hand was armed"),
         };
         self.burst = None;
-        self.write(now, |writer, device, at| writer.event(device, at, Level::Info, &words))
+        self.write(now, move |writer, device, at| writer.event(device, at, Level::Info, &words))
     }
 
     fn write(
         &self,
         now: Instant,
-        write: impl FnOnce(&mut Writer, Device, Stamp) -> Result<(), RecordingError>,
+        write: impl FnOnce(&mut Writer, Device, Stamp) -> Result<(), RecordingError> + Send + 'static,
     ) -> Result<(), RecordingError> {
-        let at = self.recording.stamp(now);
-        match (self.recording.lock().as_mut(), self.device) {
-            (Some(writer), Some(device)) => write(writer, device, at),
-            _ => Ok(()),
+        if let Some(error) = lock(&self.recording.told).error.take() {
+            return Err(error);
+        }
+        let (at, device) = (self.recording.stamp(now), Arc::clone(&self.device));
+        self.send(Box::new(move |writer| match device.get() {
+            Some(&device) => write(writer, device, at),
+            None => Ok(()),
+        }));
+        Ok(())
+    }
+
+    fn send(&self, entry: Entry) {
+        if let Some(entries) = &self.entries {
+            // After the end of the file it goes nowhere.
+            let _ = entries.send(Some(entry));
         }
     }
 }

@@ -156,7 +156,7 @@ impl Follower {
                 break;
             }
         }
-        self.record(|recorder| recorder.finish(Instant::now()));
+        self.record(|recorder| recorder.finish(Instant::now()).map(|_| ()));
     }
 
     /// Writes something down, as long as that can be done; a hand is not let go for the sake of a disk.

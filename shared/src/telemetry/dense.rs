@@ -326,7 +326,8 @@ pub(crate) fn read<const J: usize>(
     let tick = body.u16()?;
     let passed = u32::from(sequence.wrapping_sub(before.sequence as u8));
     let ticks = u32::from(tick.wrapping_sub(before.tick as u16));
-    if passed as usize > WINDOW || ticks != (passed * u32::from(before.decimation)) & 0xffff {
+    if !(1..=WINDOW).contains(&(passed as usize)) || ticks != (passed * u32::from(before.decimation)) & 0xffff
+    {
         return Err(Undecoded::Lost);
     }
     let sequence = before.sequence.wrapping_add(passed);

@@ -1,7 +1,7 @@
 //! The lines at the top: who, how, what is wrong, what was answered, and how the link is.
 
 use super::super::model::{Level, Link, Model};
-use super::{Screen, Source, fit};
+use super::{Screen, Source, fit, fixed};
 use blindgrasp_shared::event::Event;
 use blindgrasp_shared::supervisor::Mode;
 use ratatui::style::{Modifier, Style};
@@ -66,7 +66,7 @@ fn state<'a>(model: &'a Model, screen: &Screen<'a>, now: Duration, width: usize)
     }
     parts.push(Span::raw(format!("force {:.2} N", record.force_n)));
     parts.push(Span::raw(format!("stiffness {:.4} N m", record.attitude_stiffness_nm)));
-    parts.push(Span::raw(format!("work {:.3} J", record.energy_j)));
+    parts.push(Span::raw(format!("work {} J", fixed(record.energy_j, 3))));
     if let Some(time_s) = model.device_time_s() {
         parts.push(Span::styled(format!("device {time_s:.1} s"), palette.faint()));
     }

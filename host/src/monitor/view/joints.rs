@@ -1,7 +1,7 @@
 //! A row a joint: where it is in its range, its torque in its limit, its speed, and what limits it.
 
 use super::super::model::{Joint, Model};
-use super::{Screen, cut};
+use super::{Screen, cut, fixed};
 use blindgrasp_shared::limit::Limiting;
 use ratatui::text::{Line, Span};
 
@@ -67,10 +67,8 @@ fn row<'a>(
     let palette = screen.palette;
     let is_chosen = screen.joint == Some(index);
     let number = |value: Option<f32>, digits: usize| {
-        // What is printed as zero has no sign.
-        let value =
-            value.map(|value| if value.abs() < 0.5 * 0.1_f32.powi(digits as i32) { 0.0 } else { value });
-        value.map_or_else(|| format!("{:>NUMBER$} ", "-"), |value| format!("{value:>NUMBER$.digits$} "))
+        let words = value.map_or("-".into(), |value| fixed(value, digits));
+        format!("{words:>NUMBER$} ")
     };
     let end = |value: Option<f32>| value.map_or("     ".into(), |value| format!("{value:>5.2}"));
     let title = joint.name.map_or_else(|| format!("joint {index}"), str::to_owned);

@@ -224,6 +224,15 @@ fn fit(parts: Vec<Span<'_>>, width: usize) -> Line<'_> {
     line
 }
 
+/// A number with so many digits behind the point; what is printed as zero has no sign.
+fn fixed(value: f32, digits: usize) -> String {
+    let text = format!("{value:.digits$}");
+    match text.strip_prefix('-') {
+        Some(rest) if rest.chars().all(|c| matches!(c, '0' | '.')) => rest.to_owned(),
+        _ => text,
+    }
+}
+
 /// A text in at most so many columns; `…` says that there was more.
 fn cut(text: &str, width: usize) -> String {
     if text.chars().count() <= width {

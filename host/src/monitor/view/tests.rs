@@ -218,6 +218,15 @@ fn without_colours_there_are_none_and_the_words_are_the_same() {
 }
 
 #[test]
+fn nothing_has_no_sign() {
+    for (value, digits, words) in
+        [(-0.0004, 3, "0.000"), (-0.0006, 3, "-0.001"), (-0.4, 0, "0"), (2.0, 1, "2.0")]
+    {
+        assert_eq!(fixed(value, digits), words);
+    }
+}
+
+#[test]
 fn the_keys_are_explained() {
     let screen = Screen { help: true, ..SCREEN };
     let shown = text(&grasping(), &screen, ms(3000), 80, 24);

@@ -104,7 +104,7 @@ impl Beside {
             time_s,
             fault: raised.fault.number(),
             joint: raised.joint.and_then(|joint| self.joint_names.get(usize::from(joint))).cloned(),
-            words: raised.to_string(),
+            words: raised.fault.words(),
         };
         let only = |side: usize| begins(side).filter(|_| now[0] != now[1]).map(raising);
         let (recorded, changed) = (only(0), only(1));

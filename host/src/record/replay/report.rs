@@ -115,7 +115,7 @@ pub struct Raising {
     /// Its joint.
     pub joint: Option<String>,
     /// In words.
-    pub words: String,
+    pub words: &'static str,
 }
 
 impl Serialize for Reason {
@@ -201,7 +201,10 @@ impl fmt::Display for OpenLoop {
         let mut faults = |words: &str, count: u64, first: &[Raising]| {
             writeln!(f, "{count} {words}")?;
             first.iter().try_for_each(|raising| {
-                writeln!(f, "  at {:.3} s, tick {}: {}", raising.time_s, raising.tick, raising.words)
+                let joint =
+                    raising.joint.as_ref().map_or(String::new(), |joint| format!("joint `{joint}`: "));
+                let Raising { time_s, tick, fault, words, .. } = raising;
+                writeln!(f, "  at {time_s:.3} s, tick {tick}: fault {fault}: {joint}{words}")
             })
         };
         faults(
