@@ -2,6 +2,7 @@
 
 use super::Outcome;
 use anyhow::Context;
+use blindgrasp::record::mcap::RecordingError;
 use blindgrasp::record::run_dir::RunDir;
 use blindgrasp::scene::Scene;
 use blindgrasp::sim::recorder::Recorder;
@@ -54,20 +55,20 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
         eprintln!("blindgrasp: warning: {warning}");
     }
     let simulation = Simulation::new(&scene).with_context(|| format!("scene {}", scene.name))?;
-    let mut recorder = match &recording {
-        Some(path) => {
-            if let Some(directory) = &directory {
-                directory.create()?;
-            }
-            Some(Recorder::create(path, arguments.force, &scene, simulation.controller())?)
-        }
-        None => None,
-    };
+    // What can't be written is told after the run, when its summary is safe; not so what is there already.
+    let mut recorder = recording.map(|path| {
+        // Whether it could be made shows in the next step.
+        let _ = directory.as_ref().map(RunDir::create);
+        Recorder::create(&path, arguments.force, &scene, simulation.controller())
+    });
+    if let Some(Err(error)) = recorder.take_if(|made| matches!(made, Err(RecordingError::Exists { .. }))) {
+        return Err(error.into());
+    }
     let bar = progress_bar(scene.duration_s);
     let run = simulation.run_watched(
         |t_s| bar.set_position((t_s * 1e3) as u64),
         |controller| {
-            if let Some(recorder) = &mut recorder {
+            if let Some(Ok(recorder)) = &mut recorder {
                 recorder.tick(controller);
             }
         },
@@ -78,7 +79,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
         if arguments.json { serde_json::to_string(&run.summary)? + "\n" } else { describe(&run.summary) };
     io::stdout().lock().write_all(text.as_bytes()).context("cannot print the summary")?;
     // The recording is nearly all there: what is wrong with it keeps nothing else from being written.
-    let recorded = recorder.map_or(Ok(()), |recorder| recorder.finish().map(|_| ()));
+    let recorded = recorder.map_or(Ok(()), |made| made.and_then(Recorder::finish).map(|_| ()));
     if let Some(directory) = &directory {
         write_files(directory, &scene, &run)?;
     }
