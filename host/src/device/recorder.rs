@@ -45,11 +45,17 @@ struct Told {
     error: Option<RecordingError>,
 }
 
+/// The writing thread, and the way to it.
+struct Writing {
+    entries: SyncSender<Option<Entry>>,
+    thread: JoinHandle<Writer>,
+}
+
 /// A recording that several devices may share. A thread writes, so that a disk that takes its time does not keep those who
 /// read from their lines.
 #[derive(Clone)]
 pub struct Recording {
-    thread: Arc<Mutex<Option<(SyncSender<Option<Entry>>, JoinHandle<Writer>)>>>,
+    thread: Arc<Mutex<Option<Writing>>>,
     told: Arc<Mutex<Told>>,
     /// The host's clock, which does not jump.
     begun: (Instant, Stamp),
@@ -63,10 +69,10 @@ impl Recording {
     pub fn create(path: &Path, force: bool) -> Result<Self, RecordingError> {
         let writer = Writer::create(path, force)?;
         let told = Arc::new(Mutex::new(Told::default()));
-        let (sender, entries) = mpsc::sync_channel(WAITING);
+        let (entries, waiting) = mpsc::sync_channel(WAITING);
         let telling = Arc::clone(&told);
-        let thread = thread::spawn(move || write_down(writer, &entries, &telling));
-        let thread = Arc::new(Mutex::new(Some((sender, thread))));
+        let thread = thread::spawn(move || write_down(writer, &waiting, &telling));
+        let thread = Arc::new(Mutex::new(Some(Writing { entries, thread })));
         Ok(Self { thread, told, begun: (Instant::now(), Stamp::now()) })
     }
 
@@ -74,7 +80,7 @@ impl Recording {
     pub fn add(&self, name: &str, port: &str, hands: &[String], decimation: u16) -> Recorder {
         let device = Arc::new(OnceLock::new());
         let (added, name) = (Arc::clone(&device), name.to_owned());
-        let entries = lock(&self.thread).as_ref().map(|(sender, _)| sender.clone());
+        let entries = lock(&self.thread).as_ref().map(|writing| writing.entries.clone());
         let recorder = Recorder {
             recording: self.clone(),
             entries,
@@ -109,8 +115,8 @@ impl Recording {
     /// # Errors
     /// If that can't be written.
     pub fn finish(&self) -> Result<Saved, RecordingError> {
-        let Some((sender, thread)) = lock(&self.thread).take() else { return Ok(self.saved()) };
-        let _ = sender.send(None);
+        let Some(Writing { entries, thread }) = lock(&self.thread).take() else { return Ok(self.saved()) };
+        let _ = entries.send(None);
         match thread.join() {
             Ok(writer) => writer.finish(),
             Err(_) => Ok(self.saved()),
