@@ -37,6 +37,9 @@ const WAITING: usize = 1 << 16;
 /// Something to be written; none at the end.
 type Entry = Box<dyn FnOnce(&mut Writer) -> Result<(), RecordingError> + Send>;
 
+/// What leads to the writing thread, and the thread.
+type Writing = (SyncSender<Option<Entry>>, JoinHandle<Writer>);
+
 /// What the writing thread has to tell.
 #[derive(Default)]
 struct Told {
@@ -49,7 +52,7 @@ struct Told {
 /// read from their lines.
 #[derive(Clone)]
 pub struct Recording {
-    thread: Arc<Mutex<Option<(SyncSender<Option<Entry>>, JoinHandle<Writer>)>>>,
+    thread: Arc<Mutex<Option<Writing>>>,
     told: Arc<Mutex<Told>>,
     /// The host's clock, which does not jump.
     begun: (Instant, Stamp),
@@ -455,11 +458,11 @@ impl Recorder {
                     }
                 }
             }
-            (Request::Telemetry { .. }, Some(Answer::Done)) => {
-                if self.phase == Phase::Telemetry {
-                    self.phase = Phase::Records;
-                }
+            (Request::Telemetry { .. }, Some(Answer::Done)) if self.phase == Phase::Telemetry => {
+                self.phase = Phase::Records;
             }
+            // It was asked for again meanwhile.
+            (Request::Telemetry { .. }, Some(Answer::Done)) => {}
             (Request::GetParameter { .. } | Request::Telemetry { .. }, _) => {
                 self.asked += 1;
                 if self.asked > TRIES * 2 {
