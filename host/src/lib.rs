@@ -21,3 +21,5 @@ pub mod record;
 pub mod report;
 pub mod scene;
 pub mod sim;
+#[cfg(feature = "command")]
+pub mod wire;

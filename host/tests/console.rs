@@ -1,9 +1,9 @@
 //! `blindgrasp console` and the talk behind it, against the device of `blindgrasp-shared`: in simulated time where the
 //! time matters, and as a command with a socket for its port.
 
-use blindgrasp::device::client::{Answer, Packet, Request};
 use blindgrasp::device::talk::{Event, PATIENCE, Talk, TalkError};
 use blindgrasp::scene::HandModel;
+use blindgrasp::wire::{Answer, Packet, Request};
 use blindgrasp::{MAX_FINGERS, MAX_JOINTS};
 use blindgrasp_shared::command::{Command, Refusal};
 use blindgrasp_shared::device::{Device, Inputs, Reading};

@@ -2,8 +2,8 @@
 //! when they like.
 
 use blindgrasp::MAX_JOINTS;
-use blindgrasp::device::client::{Packet, Record, Request};
 use blindgrasp::device::transport::{Transport, TransportError};
+use blindgrasp::wire::{Packet, Record, Request};
 use blindgrasp_shared::command::Refusal;
 use blindgrasp_shared::link::{Counters, Receiver, encode, message, most_bytes};
 use blindgrasp_shared::telemetry::INTERFACE_VERSION;

@@ -6,8 +6,8 @@
 //! QEMU has the SPI controllers, but nothing is connected to them: no counter answers.
 #![cfg(unix)]
 
-use blindgrasp::device::client::{Packet, Record, Request};
 use blindgrasp::scene::HandModel;
+use blindgrasp::wire::{Packet, Record, Request};
 use blindgrasp::{MAX_FINGERS, MAX_JOINTS};
 use blindgrasp_shared::command::{Command, Grasp, Refusal};
 use blindgrasp_shared::event::Event;

@@ -5,7 +5,7 @@
 //! On demand, ten simulated minutes: `-- --ignored --show-output`.
 #![cfg(unix)]
 
-use blindgrasp::device::client::{Answer, Client, Packet, Patience, Request, Sample};
+use blindgrasp::device::client::{Client, Patience};
 use blindgrasp::device::pil::{Linked, Pilot, Plan};
 use blindgrasp::device::qemu::{Emulated, Qemu};
 use blindgrasp::device::transport::Transport;
@@ -14,6 +14,7 @@ use blindgrasp::record::sample::Sample as PlantSample;
 use blindgrasp::scene::Scene;
 use blindgrasp::sim::injection::{Injection, Kind};
 use blindgrasp::sim::{Run, Simulation};
+use blindgrasp::wire::{Answer, Packet, Request, Sample};
 use blindgrasp_shared::command::{Command, Grasp, Refusal};
 use blindgrasp_shared::fault::{Fault, Raised, Reaction};
 use blindgrasp_shared::identity::Clock;

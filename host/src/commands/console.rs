@@ -2,11 +2,11 @@
 
 use super::{Outcome, ports};
 use anyhow::{Context, anyhow, bail};
-use blindgrasp::device::client::{Answer, Firmware, Record, Request};
 use blindgrasp::device::recorder::{Recorder, Recording};
 use blindgrasp::device::talk::{self, Event, SELDOM, Talk, telemetry};
 use blindgrasp::device::transport::{Transport, TransportError};
 use blindgrasp::scene::HandModel;
+use blindgrasp::wire::{Answer, Firmware, Record, Request};
 use blindgrasp_shared::command::{self, Command, Grasp, Refusal};
 use blindgrasp_shared::settings::{Each, Parameter};
 use clap::Args;

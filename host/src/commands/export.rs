@@ -1,6 +1,7 @@
 //! `blindgrasp export`: a recording as a table.
 
-use super::{Outcome, Span, chosen_device, damage_of, reading_bar, start_ns};
+use super::Outcome;
+use super::recording::{Span, chosen_device, damage_of, reading_bar, start_ns};
 use anyhow::{Context, bail};
 use blindgrasp::record::export::{ExportError, Exported, Format, Request, export};
 use blindgrasp::record::mcap::Recording;

@@ -2,12 +2,12 @@
 
 use super::{Outcome, ports};
 use anyhow::{Context, anyhow, bail};
-use blindgrasp::device::client::Request;
 use blindgrasp::device::interrupt;
 use blindgrasp::device::recorder::{Recorder, Recording, Totals};
 use blindgrasp::device::talk::{self, Event, Talk, TalkError};
 use blindgrasp::device::transport::{Transport, TransportError};
 use blindgrasp::record::mcap::{RecordingError, Saved};
+use blindgrasp::wire::Request;
 use blindgrasp_shared::link::message::Signals;
 use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};

@@ -1,6 +1,7 @@
 //! `blindgrasp replay`: a recording through the controller again.
 
-use super::{Outcome, Span, chosen_device, damage_of, reading_bar, start_ns};
+use super::Outcome;
+use super::recording::{Span, chosen_device, damage_of, reading_bar, start_ns};
 use anyhow::Context;
 use blindgrasp::record::mcap::Recording;
 use blindgrasp::record::replay::{Change, Report, Wanted, replay};

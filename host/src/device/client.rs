@@ -8,23 +8,13 @@
 
 use super::transport::{Transport, TransportError};
 use crate::MAX_JOINTS;
-use blindgrasp_shared::command::Refusal;
-use blindgrasp_shared::identity::{Clock, Crash, Identity, ResetCause};
-use blindgrasp_shared::link::message::{self, Reply};
+use crate::wire::{Answer, Firmware, Packet, Request, Sample, Turned, in_words, other_interface};
+use blindgrasp_shared::link::message::Reply;
 use blindgrasp_shared::link::{FrameError, Receiver, encode, most_bytes};
-use blindgrasp_shared::telemetry::{self, INTERFACE_VERSION};
+use blindgrasp_shared::telemetry::INTERFACE_VERSION;
 use serde::Serialize;
 use std::fmt;
 use std::time::{Duration, Instant};
-
-/// A request with its session and number.
-pub type Packet = message::Packet<MAX_JOINTS>;
-/// A request.
-pub type Request = message::Request<MAX_JOINTS>;
-/// The joints of a tick.
-pub type Sample = message::Sample<MAX_JOINTS>;
-/// What a tick did.
-pub type Record = telemetry::Record<f32, MAX_JOINTS>;
 
 /// Bytes of the CRC-32 behind a payload.
 const CRC_BYTES: usize = 4;
@@ -50,77 +40,6 @@ impl Default for Patience {
     fn default() -> Self {
         Self { start: Duration::from_secs(10), answer: Duration::from_secs(5) }
     }
-}
-
-/// What a firmware says of itself.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Firmware {
-    /// All of it in a line.
-    pub words: String,
-    /// `hand` or `pil`.
-    pub kind: String,
-    /// Name of its hand.
-    pub hand: String,
-    /// CRC-32 of its hand's model and configuration.
-    pub hand_hash: u32,
-    /// Joints of its hand.
-    pub joint_count: usize,
-    /// What gives it its time.
-    pub clock: Clock,
-    /// Why it started.
-    pub reset: ResetCause,
-    /// How it ended before, if that was not in order.
-    pub crash: Option<Crash>,
-}
-
-impl From<&Identity<'_>> for Firmware {
-    fn from(identity: &Identity<'_>) -> Self {
-        let &Identity { image, clock, reset, crash, .. } = identity;
-        Self {
-            words: image.to_string(),
-            kind: image.kind.to_owned(),
-            hand: image.hand.to_owned(),
-            hand_hash: image.hand_hash,
-            joint_count: usize::from(image.joint_count),
-            clock,
-            reset,
-            crash,
-        }
-    }
-}
-
-/// The answer to a request.
-#[derive(Clone, Debug, PartialEq)]
-pub enum Answer {
-    /// To `Hello`.
-    Identity {
-        /// Number of the session.
-        session: u16,
-        /// Who it is.
-        firmware: Firmware,
-    },
-    /// It is done.
-    Done,
-    /// It was refused.
-    Refused(Refusal),
-    /// To `GetParameter`.
-    Value(f32),
-    /// To `Burst`.
-    Burst {
-        /// How many records there are.
-        count: u16,
-        /// The one that was asked for.
-        record: Box<Record>,
-    },
-}
-
-/// What came of a tick.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Turned {
-    /// The answer to the request that it took.
-    pub answer: Option<Answer>,
-    /// What it did.
-    pub record: Record,
 }
 
 /// What went over the line.
@@ -423,26 +342,5 @@ impl<T: Transport> Client<T> {
 
     fn line(&mut self, source: TransportError) -> ClientError {
         ClientError::Line { source, trouble: self.transport.trouble() }
-    }
-}
-
-/// The interface version of a firmware whose introduction can't be read: that is what every version begins with.
-fn other_interface(payload: &[u8]) -> Option<u16> {
-    let (identity, _, _, theirs) = postcard::take_from_bytes::<(u8, u16, u16, u16)>(payload).ok()?.0;
-    (identity == 0 && theirs != INTERFACE_VERSION).then_some(theirs)
-}
-
-/// A request in words.
-pub(super) fn in_words(packet: Option<&Packet>) -> String {
-    let Some(packet) = packet else { return "the joints of a tick".to_owned() };
-    match packet.request {
-        Request::Hello { .. } => "`hello`".to_owned(),
-        Request::Command(command) => format!("`{}`", command.words()),
-        Request::Heartbeat => "a heartbeat".to_owned(),
-        Request::SetParameter { parameter, index, value } => format!("`{parameter}` [{index}] = {value}"),
-        Request::GetParameter { parameter, index } => format!("what `{parameter}` [{index}] is"),
-        Request::Telemetry { .. } => "`telemetry`".to_owned(),
-        Request::Burst { index } => format!("record {index} of the burst"),
-        Request::Joints(_) => "the joints of a tick".to_owned(),
     }
 }

@@ -2,8 +2,8 @@
 //! the same queues with the same room, in the same order, and a line of the same speed. So what a real line has no time for
 //! is dropped here, too, and counted in the same place.
 
-use super::client::{Packet, Record};
 use crate::MAX_JOINTS;
+use crate::wire::{Packet, Record};
 use blindgrasp_shared::command::{Command, Refusal};
 use blindgrasp_shared::device::Outputs;
 use blindgrasp_shared::link::message::{self, Request, Signals, not_understood};

@@ -4,14 +4,13 @@
 //!   `flash` (feature `probe`): images onto a chip.
 //! - Processor in the loop, from the ground up: [`interrupt`], whether the user wants an end; [`transport`], bytes to and
 //!   from; `qemu`, the emulator as a process; [`client`], messages and answers; [`twin`], the firmware's double on the host;
-//!   [`compare`], whether they are one; [`pil`], a hand in a simulation whose controller is the firmware.
+//!   [`pil`], a hand in a simulation whose controller is the firmware.
 //! - [`talk`]: a session with a hand whose joints are real; [`recorder`]: a recording of it.
 //! - A hand for those who have none, from the ground up: [`simulated`], device and world, a tick at a time; [`line`](mod@line), the
 //!   firmware's queues; `pty`, a serial port that is none; `serve`, all of it in real time.
 
 pub mod build;
 pub mod client;
-pub mod compare;
 #[cfg(feature = "probe")]
 pub mod flash;
 pub mod image;

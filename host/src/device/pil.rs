@@ -12,14 +12,13 @@
 //! Before it arms, the pilot lets the firmware do as many ticks as it has requests, with joints that stand still. From the
 //! first command on everything is as in a simulation without firmware, to the bit.
 
-use super::client::{
-    Answer, Client, ClientError, Firmware, Packet, Request, Sample, Traffic, Turned, in_words,
-};
-use super::compare::Comparison;
+use super::client::{Client, ClientError, Traffic};
 use super::transport::Transport;
 use super::twin::Twin;
+use crate::record::compare::Comparison;
 use crate::scene::{HandModel, Scene, SceneError};
 use crate::sim::controller::{Controller, Reach, Stepped, Turn};
+use crate::wire::{Answer, Firmware, Packet, Request, Sample, Turned, in_words};
 use crate::{MAX_FINGERS, MAX_JOINTS};
 use blindgrasp_shared::command::{Command, Refusal};
 use blindgrasp_shared::parameter::ParameterError;

@@ -5,12 +5,12 @@
 //! then for every tick's record and for snapshots of the state; after a parameter was set, for these again, so that a replay
 //! has a state to go on from. What was caught around a fault is read slowly, in the time that the records leave on the line.
 
-use super::client::{Answer, Firmware, Request};
 use super::talk::{Event, Talk};
 use super::transport::BAUD;
 use crate::MAX_JOINTS;
 use crate::record::mcap::{About, Device, Level, LinkStatus, RecordingError, Saved, Setting, Stamp, Writer};
 use crate::scene::{HandFile, HandModel};
+use crate::wire::{Answer, Firmware, Request};
 use blindgrasp_shared::command::Refusal;
 use blindgrasp_shared::link::message::{Reply, Signals};
 use blindgrasp_shared::settings::{Each, Parameter};

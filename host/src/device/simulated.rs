@@ -5,13 +5,13 @@
 //! the object, or has no grasp any more, the joints glide back to where they began, as if somebody opened the hand and put
 //! the object back; the next grasp begins there.
 
-use super::client::Packet;
 use super::pil::{PilError, Plan};
 use crate::plant::dynamics::JointVector;
 use crate::plant::{Lost, ModelError, Plant};
 use crate::scene::{HandModel, Scene};
 use crate::sim::encoders::Encoders;
 use crate::sim::motors::Motors;
+use crate::wire::Packet;
 use crate::{MAX_FINGERS, MAX_JOINTS, sim};
 use blindgrasp_shared::device::{Device, Inputs, Outputs, Reading};
 use blindgrasp_shared::fault::{Fault, Raised};
@@ -224,7 +224,7 @@ impl SimulatedHand {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::device::client::Request;
+    use crate::wire::Request;
     use blindgrasp_shared::command::{Command, Grasp};
 
     struct Bench {

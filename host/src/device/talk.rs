@@ -9,11 +9,12 @@
 //! Beside the talk of a user something else may go on that he does not see: what is asked aside waits for what he asks, and is
 //! answered aside. Who records takes a talk that is tapped, which tells every payload that goes over the line.
 
-use super::client::{Answer, Firmware, Packet, Patience, Record, Request, Traffic};
+use super::client::{Patience, Traffic};
 #[cfg(unix)]
 use super::transport::Streams;
 use super::transport::{BAUD, OpenError, SerialPort, Transport};
 use crate::MAX_JOINTS;
+use crate::wire::{Answer, Firmware, Packet, Record, Request, other_interface};
 use blindgrasp_shared::command::{Command, Refusal};
 use blindgrasp_shared::fault::Raised;
 use blindgrasp_shared::link::message::{Reply, Signals};
@@ -473,12 +474,6 @@ impl Talk {
         self.state = Some((record.mode, record.fault));
         self.events.push_back(Event::Record(record));
     }
-}
-
-/// The interface version of a firmware whose introduction can't be read: that is what every version begins with.
-fn other_interface(payload: &[u8]) -> Option<u16> {
-    let (identity, _, _, theirs) = postcard::take_from_bytes::<(u8, u16, u16, u16)>(payload).ok()?.0;
-    (identity == 0 && theirs != INTERFACE_VERSION).then_some(theirs)
 }
 
 /// Why a line could not be opened.

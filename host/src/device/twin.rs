@@ -1,8 +1,8 @@
 //! The firmware's double on the host: the same device with the same parameters, which is told the same.
 
-use super::client::{Answer, Firmware, Packet, Sample, Turned};
 use super::pil::{Peer, PilError};
 use crate::scene::HandModel;
+use crate::wire::{Answer, Firmware, Packet, Sample, Turned};
 use crate::{MAX_FINGERS, MAX_JOINTS};
 use blindgrasp_shared::device::{Device, Inputs, Reading};
 use blindgrasp_shared::fault::{Fault, Raised};

@@ -1,7 +1,7 @@
 //! What can be learnt from the payloads on the line alone: the session's number, and which heartbeats were answered.
 
 use crate::MAX_JOINTS;
-use crate::device::client::{Packet, Request};
+use crate::wire::{Packet, Request};
 use blindgrasp_shared::link::message::Reply;
 use std::collections::VecDeque;
 

@@ -6,12 +6,12 @@
 
 use super::exchange::Exchange;
 use super::model::{Level, News, Session};
-use crate::device::client::{Answer, Firmware, Request};
 use crate::device::recorder::Recorder;
 use crate::device::talk::{self, Event, LineError, Talk, TalkError};
 use crate::device::transport::{self, Transport, TransportError};
 use crate::record::mcap::RecordingError;
 use crate::scene::HandModel;
+use crate::wire::{Answer, Firmware, Request};
 use blindgrasp_shared::command::{self, Command, Refusal};
 use blindgrasp_shared::link::message::Signals;
 use blindgrasp_shared::settings::Parameter;

@@ -5,9 +5,9 @@
 
 use super::history::{History, Range};
 use super::rate::Rate;
-use crate::device::client::Record;
 use crate::device::transport::BAUD;
 use crate::scene::HandModel;
+use crate::wire::Record;
 use blindgrasp_shared::command::{Command, Refusal};
 use blindgrasp_shared::event;
 use blindgrasp_shared::limit::Limiting;

@@ -342,7 +342,7 @@ mod tests {
             }
             for (k, device) in devices.into_iter().enumerate() {
                 let number = tick / 10 * (k as u32 + 1);
-                let record = crate::device::client::Record { sequence: number, ..record(tick) };
+                let record = crate::wire::Record { sequence: number, ..record(tick) };
                 let payload = postcard::to_slice(&Reply::Record(record), &mut buffer).expect("room");
                 writer.received(device, at(tick), payload).expect("room");
             }

@@ -1,5 +1,7 @@
 //! What a run leaves behind: samples in memory, files in a directory, and recordings of hands.
 
+#[cfg(feature = "command")]
+pub mod compare;
 pub mod csv;
 #[cfg(feature = "command")]
 pub mod export;

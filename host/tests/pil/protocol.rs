@@ -2,8 +2,8 @@
 
 use crate::device::{Firmware, PATIENCE, Wrong};
 use blindgrasp::device::client::Client;
-use blindgrasp::device::compare::Value;
 use blindgrasp::device::pil::{Linked, PilError, Pilot, Plan};
+use blindgrasp::record::compare::Value;
 use blindgrasp::scene::Scene;
 use blindgrasp::sim::{Run, Simulation};
 use blindgrasp_shared::settings::Parameter;

@@ -3,7 +3,7 @@
 use super::super::model::tests::{fed, ms, record, session};
 use super::super::model::{Level, News};
 use super::*;
-use crate::device::client::Record;
+use crate::wire::Record;
 use blindgrasp_shared::fault::{Fault, Raised};
 use blindgrasp_shared::limit::{Limit, Limiting};
 use blindgrasp_shared::settings::Parameter;

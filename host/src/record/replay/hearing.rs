@@ -1,8 +1,8 @@
 //! What of a recording concerns a replay, heard from the raw payloads.
 
 use crate::MAX_JOINTS;
-use crate::device::client::{Packet, Record, Request};
 use crate::record::mcap::{About, Entry, Setting, Stamp, What};
+use crate::wire::{Packet, Record, Request};
 use blindgrasp_shared::command::Refusal;
 use blindgrasp_shared::link::Listener;
 use blindgrasp_shared::link::message::Reply;

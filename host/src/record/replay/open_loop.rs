@@ -1,7 +1,7 @@
 //! What other parameters would have made of the same counts: torques, limits and faults beside each other.
 
 use super::report::{JointChange, LimitShare, OpenLoop, Raising};
-use crate::device::client::Record;
+use crate::wire::Record;
 use blindgrasp_shared::fault::Raised;
 use blindgrasp_shared::limit::Limit;
 use blindgrasp_shared::math::Real;

@@ -1,7 +1,7 @@
 //! What came of a replay, as JSON and in words.
 
 use super::{Gap, Reason};
-use crate::device::compare::Difference;
+use crate::record::compare::Difference;
 use serde::{Serialize, Serializer};
 use std::fmt;
 

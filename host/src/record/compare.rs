@@ -1,6 +1,6 @@
 //! What two devices that were told the same did, bit for bit.
 
-use super::client::{Answer, Record, Turned};
+use crate::wire::{Answer, Record, Turned};
 use serde::Serialize;
 use std::fmt;
 
@@ -81,7 +81,7 @@ impl Comparison {
     }
 
     /// Compares a tick. What only one of the two can know is left out: how long the tick took.
-    pub(super) fn add(&mut self, tick: i64, device: &Turned, host: &Turned) {
+    pub(crate) fn add(&mut self, tick: i64, device: &Turned, host: &Turned) {
         let host_record =
             Record { cycles: device.record.cycles, dropped: device.record.dropped, ..host.record.clone() };
         self.records(tick, &device.record, &host_record);

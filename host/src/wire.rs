@@ -1,0 +1,108 @@
+//! What goes over the wire, as the host has it: the messages of a hand of any size, and what they say.
+
+use crate::MAX_JOINTS;
+use blindgrasp_shared::command::Refusal;
+use blindgrasp_shared::identity::{Clock, Crash, Identity, ResetCause};
+use blindgrasp_shared::link::message;
+use blindgrasp_shared::telemetry::{self, INTERFACE_VERSION};
+
+/// A request with its session and number.
+pub type Packet = message::Packet<MAX_JOINTS>;
+/// A request.
+pub type Request = message::Request<MAX_JOINTS>;
+/// The joints of a tick.
+pub type Sample = message::Sample<MAX_JOINTS>;
+/// What a tick did.
+pub type Record = telemetry::Record<f32, MAX_JOINTS>;
+
+/// What a firmware says of itself.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Firmware {
+    /// All of it in a line.
+    pub words: String,
+    /// `hand` or `pil`.
+    pub kind: String,
+    /// Name of its hand.
+    pub hand: String,
+    /// CRC-32 of its hand's model and configuration.
+    pub hand_hash: u32,
+    /// Joints of its hand.
+    pub joint_count: usize,
+    /// What gives it its time.
+    pub clock: Clock,
+    /// Why it started.
+    pub reset: ResetCause,
+    /// How it ended before, if that was not in order.
+    pub crash: Option<Crash>,
+}
+
+impl From<&Identity<'_>> for Firmware {
+    fn from(identity: &Identity<'_>) -> Self {
+        let &Identity { image, clock, reset, crash, .. } = identity;
+        Self {
+            words: image.to_string(),
+            kind: image.kind.to_owned(),
+            hand: image.hand.to_owned(),
+            hand_hash: image.hand_hash,
+            joint_count: usize::from(image.joint_count),
+            clock,
+            reset,
+            crash,
+        }
+    }
+}
+
+/// The answer to a request.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Answer {
+    /// To `Hello`.
+    Identity {
+        /// Number of the session.
+        session: u16,
+        /// Who it is.
+        firmware: Firmware,
+    },
+    /// It is done.
+    Done,
+    /// It was refused.
+    Refused(Refusal),
+    /// To `GetParameter`.
+    Value(f32),
+    /// To `Burst`.
+    Burst {
+        /// How many records there are.
+        count: u16,
+        /// The one that was asked for.
+        record: Box<Record>,
+    },
+}
+
+/// What came of a tick.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Turned {
+    /// The answer to the request that it took.
+    pub answer: Option<Answer>,
+    /// What it did.
+    pub record: Record,
+}
+
+/// The interface version of a firmware whose introduction can't be read: that is what every version begins with.
+pub(crate) fn other_interface(payload: &[u8]) -> Option<u16> {
+    let (identity, _, _, theirs) = postcard::take_from_bytes::<(u8, u16, u16, u16)>(payload).ok()?.0;
+    (identity == 0 && theirs != INTERFACE_VERSION).then_some(theirs)
+}
+
+/// A request in words.
+pub(crate) fn in_words(packet: Option<&Packet>) -> String {
+    let Some(packet) = packet else { return "the joints of a tick".to_owned() };
+    match packet.request {
+        Request::Hello { .. } => "`hello`".to_owned(),
+        Request::Command(command) => format!("`{}`", command.words()),
+        Request::Heartbeat => "a heartbeat".to_owned(),
+        Request::SetParameter { parameter, index, value } => format!("`{parameter}` [{index}] = {value}"),
+        Request::GetParameter { parameter, index } => format!("what `{parameter}` [{index}] is"),
+        Request::Telemetry { .. } => "`telemetry`".to_owned(),
+        Request::Burst { index } => format!("record {index} of the burst"),
+        Request::Joints(_) => "the joints of a tick".to_owned(),
+    }
+}
