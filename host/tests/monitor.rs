@@ -322,6 +322,47 @@ fn ctrl_c_and_signals_stop_the_hand_and_give_the_terminal_back() {
 }
 
 #[test]
+fn a_terminal_that_is_gone_ends_it_and_stops_the_hand() {
+    let folder = folder();
+    let hand = Hand::serve(&folder);
+    let (mut pty, pts) = blocking::open().expect("a pseudo-terminal");
+    pty.resize(Size::new(ROWS, COLUMNS)).expect("a size");
+    let mut child = blocking::Command::new(BLINDGRASP)
+        .args(["monitor", "--port", text(&hand.port)])
+        .env("TERM", "xterm-256color")
+        .spawn(pts)
+        .expect("the command starts");
+    let mut screen = vt100::Parser::new(ROWS, COLUMNS, 0);
+    let mut wait_for = |pty: &mut Pty, mode: &str| {
+        let begun = Instant::now();
+        let mut bytes = [0; 4096];
+        while !screen.screen().contents().starts_with(&format!(" {mode} ")) {
+            assert!(begun.elapsed() < PATIENCE, "waiting for {mode}:\n{}", screen.screen().contents());
+            let count = pty.read(&mut bytes).expect("a picture");
+            screen.process(&bytes[..count]);
+        }
+    };
+    wait_for(&mut pty, "DISARMED");
+    pty.write_all(b"a\r").expect("keys");
+    wait_for(&mut pty, "ARMED");
+    drop(pty);
+    let begun = Instant::now();
+    let status = loop {
+        match child.try_wait().expect("a child") {
+            Some(status) => break status,
+            None if begun.elapsed() < PATIENCE => thread::sleep(Duration::from_millis(20)),
+            None => {
+                let _ = child.kill();
+                panic!("it goes on without a terminal");
+            }
+        }
+    };
+    assert!(status.code().is_some(), "{status}");
+    // Stopped, not left to its fault: that would not be disarmed.
+    Terminal::watching(&hand);
+}
+
+#[test]
 fn every_size_can_be_worked_with() {
     let folder = folder();
     let hand = Hand::serve(&folder);

@@ -162,6 +162,27 @@ fn assert_whole(records: &[Decoded]) {
     }
 }
 
+/// What the other commands make of a recording without a gap: the same bits again, and a row a record.
+fn assert_replayed_and_exported(path: &Path, records: &[Decoded]) {
+    let file = path.to_str().expect("UTF-8");
+    let run = |arguments: &[&str]| {
+        let (code, said, errors) = Process::start(blindgrasp(arguments)).end(PATIENCE);
+        assert_eq!(code, Some(0), "{said}\n{errors}");
+        said
+    };
+    let replay: Value = serde_json::from_str(&run(&["replay", "--json", file])).expect("JSON");
+    println!("replay: {} ticks, {} bits differ", replay["ticks"], replay["bits_differ"]);
+    assert_eq!(replay["bits_differ"], 0);
+    let [ticks, not_replayed] = ["ticks", "not_replayed"].map(|key| replay[key].as_u64().expect("a number"));
+    assert_eq!(ticks + not_replayed, records.len() as u64);
+    // What comes before the first state, and after a parameter was set.
+    assert!(not_replayed < 200, "{not_replayed}");
+    let table = path.with_extension("csv");
+    run(&["export", file, "--to", "csv", "--out", table.to_str().expect("UTF-8")]);
+    let rows = fs::read_to_string(&table).expect("a table").lines().count() - 1;
+    assert_eq!(rows, records.len());
+}
+
 /// Records a hand that does nothing for so long; returns the shares of a processor that recording and serving took.
 fn idle_hand(seconds: u32) -> [f64; 2] {
     let folder = TempDir::new().expect("a folder");
@@ -191,6 +212,7 @@ fn idle_hand(seconds: u32) -> [f64; 2] {
     let ticks = every_tick(&content.records).len() as f64;
     assert!(ticks > 1e3 * f64::from(seconds) - 1500.0, "{ticks} ticks");
     assert!(content.snapshots.len() as u32 + 2 >= seconds, "{} snapshots", content.snapshots.len());
+    assert_replayed_and_exported(&out, &content.records);
     // Four times what it is without optimization.
     assert!(cfg!(debug_assertions) || shares[0] < 0.15, "{shares:?}");
     shares
@@ -244,6 +266,7 @@ fn a_script_is_recorded_with_its_grasp_a_fault_and_what_was_caught_around_it() {
     assert!(content.snapshots.windows(2).any(|pair| (1..1000).contains(&pair[1].wrapping_sub(pair[0]))));
     let angles = content.records.iter().filter(|decoded| !decoded.angles_rad.as_slice().is_empty()).count();
     assert!(angles + 200 > content.records.len(), "{angles} records with angles");
+    assert_replayed_and_exported(&out, &content.records);
 }
 
 #[test]
