@@ -576,23 +576,12 @@ pub(super) mod tests {
         Record {
             sequence: tick,
             tick,
-            mode: Mode::Disarmed,
-            fault: None,
-            answer: None,
-            events: Events::NONE,
-            reading_failed: None,
-            force_n: 0.0,
-            attitude_stiffness_nm: 0.0,
-            approach_potential_j: 0.0,
-            attitude_potential_j: 0.0,
-            energy_j: 0.0,
             cycles: 16_800,
-            late_ticks: 0,
-            dropped: 0,
             decimation: 1,
             counts: List::first_of(counts, 12),
             torques_nm: List::first_of([0.25; crate::MAX_JOINTS], 12),
             limiting: List::first_of([Limiting::NONE; crate::MAX_JOINTS], 12),
+            ..Record::BLANK
         }
     }
 

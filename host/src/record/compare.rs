@@ -200,7 +200,6 @@ fn numbers(record: &Record) -> [(&'static str, f32); 5] {
 mod tests {
     use super::*;
     use blindgrasp_shared::command::{Command, Refusal};
-    use blindgrasp_shared::event::Events;
     use blindgrasp_shared::fault::{Fault, Raised};
     use blindgrasp_shared::supervisor::Mode;
     use blindgrasp_shared::telemetry::List;
@@ -212,22 +211,10 @@ mod tests {
             sequence: 3,
             tick: 3,
             mode: Mode::Armed,
-            fault: None,
-            answer: None,
-            events: Events::NONE,
-            reading_failed: None,
-            force_n: 0.0,
-            attitude_stiffness_nm: 0.0,
-            approach_potential_j: 0.0,
-            attitude_potential_j: 0.0,
-            energy_j: 0.0,
-            cycles: 0,
-            late_ticks: 0,
-            dropped: 0,
             decimation: 1,
             counts: List::first_of([0; crate::MAX_JOINTS], 3),
             torques_nm: List::first_of(torques_nm, 3),
-            limiting: List::default(),
+            ..Record::BLANK
         };
         Turned { answer: None, record }
     }

@@ -65,27 +65,7 @@ pub(crate) struct Hand {
 
 impl Hand {
     pub(crate) fn new(joints: usize) -> Self {
-        let record = Record {
-            sequence: 0,
-            tick: 0,
-            mode: Mode::Disarmed,
-            fault: None,
-            answer: None,
-            events: Events::NONE,
-            reading_failed: None,
-            force_n: 0.0,
-            attitude_stiffness_nm: 0.0,
-            approach_potential_j: 0.0,
-            attitude_potential_j: 0.0,
-            energy_j: 0.0,
-            cycles: 0,
-            late_ticks: 0,
-            dropped: 0,
-            decimation: 1,
-            counts: List::default(),
-            torques_nm: List::default(),
-            limiting: List::default(),
-        };
+        let record = Record { decimation: 1, ..Record::BLANK };
         Self { record, joints, sender: Sender::new() }
     }
 

@@ -4,38 +4,8 @@ use crate::hand::{Hand, about, read, settings};
 use blindgrasp::record::mcap::{Decoded, Decoder, Stamp, What, Writer};
 use blindgrasp_shared::limit::Limit;
 use serde_json::Value;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::Command;
-
-/// A Python that has the packages, made once in the target directory; or why there is none.
-fn python() -> Result<(PathBuf, PathBuf), String> {
-    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("python-mcap");
-    let packages = folder.join("packages");
-    let python = PathBuf::from("python3");
-    let run = |arguments: &[&str]| {
-        let output = Command::new(&python).args(arguments).env("PYTHONPATH", &packages).output();
-        match output {
-            Ok(output) if output.status.success() => Ok(()),
-            Ok(output) => Err(String::from_utf8_lossy(&output.stderr).trim().to_owned()),
-            Err(error) => Err(error.to_string()),
-        }
-    };
-    let has_packages = || run(&["-c", "import mcap, mcap_protobuf"]);
-    if has_packages().is_err() {
-        let target = packages.to_string_lossy().into_owned();
-        run(&[
-            "-m",
-            "pip",
-            "install",
-            "--quiet",
-            "--target",
-            &target,
-            "mcap==1.3.0",
-            "mcap-protobuf-support==0.5.3",
-        ])?;
-    }
-    has_packages().map(|()| (python, packages))
-}
 
 /// A float as Python told it: every `f32` is an `f64` that JSON keeps.
 fn float(value: &Value) -> f32 {
@@ -100,16 +70,8 @@ fn compare(told: &Value, ours: &Decoded, joint_names: &[String]) {
 }
 
 #[test]
+#[ignore = "needs the Python packages mcap and mcap-protobuf-support, which tests/run gets"]
 fn python_reads_the_same_values() {
-    let (python, packages) = match python() {
-        Ok(found) => found,
-        Err(problem) => {
-            eprintln!(
-                "SKIPPED, not passed: the Python packages mcap and mcap-protobuf-support can't be had: {problem}"
-            );
-            return;
-        }
-    };
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.mcap");
     for finish in [true, false] {
@@ -138,8 +100,7 @@ fn python_reads_the_same_values() {
             std::mem::forget(writer);
         }
         let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("../tests/python/read_recording.py");
-        let output =
-            Command::new(&python).arg(script).arg(&path).env("PYTHONPATH", &packages).output().unwrap();
+        let output = Command::new("python3").arg(script).arg(&path).output().unwrap();
         assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
         let told: Value = serde_json::from_slice(&output.stdout).unwrap();
         assert_eq!(told["finished"], finish);
