@@ -22,4 +22,6 @@ pub mod report;
 pub mod scene;
 pub mod sim;
 #[cfg(feature = "command")]
+pub mod sweep;
+#[cfg(feature = "command")]
 pub mod wire;

@@ -76,7 +76,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
         export(&mut entries, |entries| bar.set_position(entries.position().0), &request, format, to);
     bar.finish_and_clear();
     let exported = match exported {
-        Err(error) if is_broken_pipe(&error) => return Ok(Outcome::Shown),
+        Err(ExportError::Table(error)) if error.is_broken_pipe() => return Ok(Outcome::Shown),
         exported => exported.with_context(|| path.display().to_string())?,
     };
     let Exported { rows, lost, gaps, ended } = exported;
@@ -100,18 +100,5 @@ fn create(path: &Path, force: bool) -> anyhow::Result<std::fs::File> {
             )
         }
         opened => opened.with_context(|| format!("cannot write {}", path.display())),
-    }
-}
-
-/// Whether the reader of stdout has seen enough.
-fn is_broken_pipe(error: &ExportError) -> bool {
-    let is_it = |error: &io::Error| error.kind() == io::ErrorKind::BrokenPipe;
-    match error {
-        ExportError::Write(error) => is_it(error),
-        ExportError::Csv(error) => matches!(error.kind(), csv::ErrorKind::Io(error) if is_it(error)),
-        ExportError::Parquet(error) => {
-            std::error::Error::source(error).and_then(|source| source.downcast_ref()).is_some_and(is_it)
-        }
-        _ => false,
     }
 }

@@ -11,3 +11,5 @@ pub mod mcap;
 pub mod replay;
 pub mod run_dir;
 pub mod sample;
+#[cfg(feature = "command")]
+pub mod table;

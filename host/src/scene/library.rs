@@ -74,17 +74,15 @@ impl Document {
         }
     }
 
-    /// Applies settings, follows the references of a scene, and fills in the defaults of its hand. Settings of what a
-    /// reference names come before it is followed, all others after.
-    pub(super) fn complete_scene(mut self, settings: &[Setting]) -> Result<Node, SceneError> {
-        let is_reference = |setting: &&Setting| setting.key == "hand" || setting.key == "object";
-        for setting in settings.iter().filter(is_reference) {
+    /// Follows the references of a scene, or those that settings have in their place, and fills in the defaults of its hand.
+    pub(super) fn follow(mut self, settings: &[Setting]) -> Result<Node, SceneError> {
+        for setting in settings.iter().filter(|setting| setting.is_reference()) {
             self.node.set(setting)?;
         }
         for (key, kind) in [("hand", Kind::Hand), ("object", Kind::Object)] {
             let Some(node) = self.node.get_mut(key) else { continue };
             if let Value::String(name) = &node.value {
-                let from_command_line = *node.place.source == *"--set";
+                let from_command_line = settings.iter().any(|setting| setting.key == key);
                 let folder = if from_command_line { Path::new("") } else { self.folder.as_path() };
                 *node = Self::open(kind, name, folder)
                     .map_err(|error| error.of_reference(key, &node.place))?
@@ -94,15 +92,19 @@ impl Document {
                 complete_hand(node);
             }
         }
-        for setting in settings.iter().filter(|setting| !is_reference(setting)) {
-            if let Some(key) = setting.key.strip_prefix("hand.control") {
-                let (problem, remedy) = ("acts in the firmware only", format!("set control{key}"));
-                return Err(SceneError::new(&setting.key, problem, remedy).at(&Place::whole("--set")));
-            }
-            self.node.set(setting)?;
-        }
         Ok(self.node)
     }
+}
+
+/// Applies settings to a scene whose references were followed; those of references have been.
+pub(super) fn apply(node: &mut Node, settings: &[Setting]) -> Result<(), SceneError> {
+    settings.iter().filter(|setting| !setting.is_reference()).try_for_each(|setting| {
+        if let Some(key) = setting.key.strip_prefix("hand.control") {
+            let (problem, remedy) = ("acts in the firmware only", format!("set control{key}"));
+            return Err(SceneError::new(&setting.key, problem, remedy).at(&setting.place));
+        }
+        node.set(setting)
+    })
 }
 
 /// Spreads the defaults of a hand.

@@ -11,6 +11,7 @@
 mod build;
 mod check;
 mod controller;
+mod draft;
 mod error;
 pub mod file;
 mod hand;
@@ -36,12 +37,14 @@ use controller::Setup;
 use library::{Document, Kind};
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 use std::path::Path;
-use tree::{Node, Setting};
+use tree::Node;
 
+pub use draft::Draft;
 pub use error::{Place, SceneError, suggestion};
 pub use file::{Actuators, Control, Friction, HandFile, ObjectFile, PlantSettings, SceneFile, Sensors};
 pub use hand_model::HandModel;
 pub use source::config_source;
+pub use tree::{Setting, is_reference};
 
 /// A scene, checked and ready for the simulator.
 #[derive(Clone, Debug, PartialEq)]
@@ -146,12 +149,7 @@ impl Scene {
 
     fn from_document(document: Document, settings: &[String]) -> Result<Self, SceneError> {
         let settings = settings.iter().map(|text| Setting::parse(text)).collect::<Result<Vec<_>, _>>()?;
-        let tree = document.complete_scene(&settings)?;
-        let file = read::read(&tree, "")?;
-        build::scene(file).map_err(|error| {
-            let place = tree.place_of(&error.key).clone();
-            error.at(&place)
-        })
+        Draft::of(document, &settings)?.scene(&settings)
     }
 
     /// Checks and prepares a scene that was put together in code.

@@ -100,17 +100,17 @@ impl Node {
         }
     }
 
-    /// Applies `KEY=VALUE`. A key is a path of names separated by dots; items of a list go by their number from 1, by the
+    /// Applies a setting. A key is a path of names separated by dots; items of a list go by their number from 1, by the
     /// `name` they have, or `*` for all.
     pub(super) fn set(&mut self, setting: &Setting) -> Result<(), SceneError> {
-        let place = Place::whole("--set");
-        let value = Self::parse_value(&setting.value, &place)?;
+        let place = &setting.place;
+        let value = Self::parse_value(&setting.value, place)?;
         let path: Vec<&str> = setting.key.split('.').collect();
         if path.len() > DEEPEST {
-            return Err(SceneError::new(&setting.key, "unknown key", "no key is that deep").at(&place));
+            return Err(SceneError::new(&setting.key, "unknown key", "no key is that deep").at(place));
         }
-        self.set_path(&path, &value, &place)
-            .map_err(|(problem, remedy)| SceneError::new(&setting.key, problem, remedy).at(&place))
+        self.set_path(&path, &value, place)
+            .map_err(|(problem, remedy)| SceneError::new(&setting.key, problem, remedy).at(place))
     }
 
     fn set_path(&mut self, path: &[&str], value: &Self, place: &Place) -> Result<(), (String, String)> {
@@ -179,23 +179,49 @@ impl Node {
     }
 }
 
-/// `KEY=VALUE` of a `--set`.
-#[derive(Clone, Debug)]
-pub(super) struct Setting {
+/// A value for a key of the configuration, from the command line.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Setting {
     pub(super) key: String,
     value: String,
+    /// The option that it stands in.
+    pub(super) place: Place,
 }
 
 impl Setting {
-    pub(super) fn parse(text: &str) -> Result<Self, SceneError> {
+    /// `KEY=VALUE` of a `--set`.
+    ///
+    /// # Errors
+    /// There is no key, or no value.
+    pub fn parse(text: &str) -> Result<Self, SceneError> {
+        let place = Place::whole("--set");
         match text.split_once('=') {
             Some((key, value)) if !key.trim().is_empty() => {
-                Ok(Self { key: key.trim().into(), value: value.trim().into() })
+                Ok(Self { key: key.trim().into(), value: value.trim().into(), place })
             }
             _ => Err(SceneError::new(text, "is not a setting", "write KEY=VALUE, such as control.force_n=4")
-                .at(&Place::whole("--set"))),
+                .at(&place)),
         }
     }
+
+    /// One of the values of a `--vary`, as a `--set` would have it.
+    pub fn varied(key: &str, value: &str) -> Self {
+        Self { key: key.into(), value: value.into(), place: Place::whole("--vary") }
+    }
+
+    /// Its key.
+    pub fn key(&self) -> &str {
+        &self.key
+    }
+
+    pub(super) fn is_reference(&self) -> bool {
+        is_reference(&self.key)
+    }
+}
+
+/// Whether a key says which hand or which object it is, by name or path.
+pub fn is_reference(key: &str) -> bool {
+    key == "hand" || key == "object"
 }
 
 /// From byte positions to lines.

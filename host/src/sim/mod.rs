@@ -37,7 +37,7 @@ use motors::Motors;
 use nalgebra::Vector3;
 use observe::{Observer, Seen};
 use std::time::Instant;
-use summary::{Ending, Summary};
+use summary::{Ending, Summary, Tally};
 
 /// Why a scene can't be simulated.
 #[derive(Debug, thiserror::Error)]
@@ -59,6 +59,19 @@ pub struct Run {
     pub first_fault: Option<(u64, Raised)>,
     /// The verdict.
     pub summary: Summary,
+}
+
+/// A run that came to its end.
+struct Driven {
+    first_fault: Option<(u64, Raised)>,
+    tally: Tally,
+    ending: Ending,
+}
+
+impl Driven {
+    fn summary(self, last: Option<&Sample>) -> Summary {
+        self.tally.summary(self.ending, last)
+    }
 }
 
 /// A scene, ready to run with a controller.
@@ -97,6 +110,14 @@ impl Simulation {
     pub fn run_watched(mut self, progress: impl FnMut(f64), watch: impl FnMut(&Alone)) -> Run {
         let Ok(run) = self.try_run_watched(progress, watch);
         run
+    }
+
+    /// Runs for the verdict alone: samples are summed up as they come, and not kept. `goes_on` is told the simulated time once
+    /// in a while; where it says no, the run ends there.
+    pub fn run_summed(mut self, goes_on: impl FnMut(f64) -> bool) -> Summary {
+        let mut last = None;
+        let Ok(driven) = self.drive(goes_on, |_| {}, |sample| last = Some(sample));
+        driven.summary(last.as_ref())
     }
 }
 
@@ -151,19 +172,37 @@ impl<C: Controller> Simulation<C> {
     fn try_run_watched(
         &mut self,
         mut progress: impl FnMut(f64),
-        mut watch: impl FnMut(&C),
+        watch: impl FnMut(&C),
     ) -> Result<Run, C::Error> {
+        let mut samples = Vec::with_capacity(self.ticks as usize + 1);
+        let goes_on = |t_s| {
+            progress(t_s);
+            true
+        };
+        let driven = self.drive(goes_on, watch, |sample| samples.push(sample))?;
+        Ok(Run { first_fault: driven.first_fault, summary: driven.summary(samples.last()), samples })
+    }
+
+    /// The loop. `keep` gets a sample a tick.
+    fn drive(
+        &mut self,
+        mut goes_on: impl FnMut(f64) -> bool,
+        mut watch: impl FnMut(&C),
+        mut keep: impl FnMut(Sample),
+    ) -> Result<Driven, C::Error> {
         // The hand is armed while everything stands still.
         let mut stepped = self.control(None, Some(Command::Arm))?;
         watch(&self.controller);
         let begun = Instant::now();
-        let mut samples = Vec::with_capacity(self.ticks as usize + 1);
+        let mut tally = Tally::default();
         let mut first_fault = None;
         let mut lost = None;
+        let mut duration_s = self.time_s(self.ticks);
         for tick in 0..=self.ticks {
             let t_s = self.time_s(tick);
-            if tick % 100 == 0 {
-                progress(t_s);
+            if tick % 100 == 0 && !goes_on(t_s) {
+                duration_s = t_s;
+                break;
             }
             // 1, 2: sense and control. The first tick is told to grasp.
             let computed_before = stepped.torques_nm;
@@ -171,17 +210,19 @@ impl<C: Controller> Simulation<C> {
             watch(&self.controller);
             first_fault = first_fault.or(stepped.fault.map(|raised| (tick, raised)));
             let wanted_nm = if self.delayed { computed_before } else { stepped.torques_nm };
-            if let Err(reason) = self.move_on(t_s, &wanted_nm, &stepped, &mut samples) {
-                lost = Some(reason);
+            let record = |sample: Sample| {
+                tally.see(&sample);
+                keep(sample);
+            };
+            if let Err(reason) = self.move_on(t_s, &wanted_nm, &stepped, record) {
+                (lost, duration_s) = (Some(reason), reason.0);
                 break;
             }
         }
-        let duration_s = lost.map_or(self.time_s(self.ticks), |(t_s, _)| t_s);
         let wall_s = begun.elapsed().as_secs_f64();
         let fault = stepped.fault.map(|raised| self.in_words(raised));
-        let summary =
-            Summary::of(Ending { scene: self.name.clone(), duration_s, lost, fault, wall_s }, &samples);
-        Ok(Run { samples, first_fault, summary })
+        let ending = Ending { scene: self.name.clone(), duration_s, lost, fault, wall_s };
+        Ok(Driven { first_fault, tally, ending })
     }
 
     /// Time of a tick, s. From whole microseconds, so that it prints as what it is.
@@ -220,7 +261,7 @@ impl<C: Controller> Simulation<C> {
         t_s: f64,
         wanted_nm: &[f32; MAX_JOINTS],
         stepped: &Stepped,
-        samples: &mut Vec<Sample>,
+        mut record: impl FnMut(Sample),
     ) -> Result<(), (f64, Lost)> {
         let joints = self.joint_names.len();
         let (angles_rad, speeds_rad_s) =
@@ -236,7 +277,7 @@ impl<C: Controller> Simulation<C> {
                 force_share,
                 mode: stepped.mode.words(),
             };
-            samples.push(observer.sample(t_s, plant, &seen));
+            record(observer.sample(t_s, plant, &seen));
         });
         moved.map_err(|(substep, lost)| {
             let at_s = (self.period_us * substep as u64) as f64 / (1e6 * self.motors.substeps as f64);

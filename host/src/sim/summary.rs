@@ -2,7 +2,7 @@
 
 use crate::plant::Lost;
 use crate::record::sample::{ContactSample, Sample};
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 /// Below these everything counts as at rest.
 const REST_JOINT_SPEED_RAD_S: f64 = 1e-3;
@@ -10,7 +10,7 @@ const REST_OBJECT_SPEED_M_S: f64 = 1e-4;
 const REST_OBJECT_SPIN_RAD_S: f64 = 1e-3;
 
 /// Summary of a run, as `--json` prints it.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Summary {
     /// Name of the scene.
     pub scene: String,
@@ -42,7 +42,7 @@ pub struct Summary {
 }
 
 /// The last instant of a run.
-#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Last {
     /// Fastest joint, rad/s.
     pub joint_speed_max_rad_s: f64,
@@ -65,7 +65,7 @@ pub struct Last {
 }
 
 /// Energy of Eq. 40 (with Eq. 18 in place of Eq. 46, and the constant that makes every term positive) over a run.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Energy {
     /// At the start, J.
     pub initial_j: f64,
@@ -90,11 +90,34 @@ pub struct Ending {
     pub wall_s: f64,
 }
 
-impl Summary {
-    /// Sums up a run.
-    pub fn of(ending: Ending, samples: &[Sample]) -> Self {
-        let settle_time_s = if ending.lost.is_none() { settle_time_s(samples) } else { None };
-        Self {
+/// Sums up a run while it goes, so that no sample has to be kept for it.
+#[derive(Clone, Debug, Default)]
+pub struct Tally {
+    /// Since when everything has been at rest, s.
+    resting_since_s: Option<f64>,
+    friction_demand_max: f64,
+    /// The energies of the run, and the least one, J.
+    energy: Option<(Energy, f64)>,
+}
+
+impl Tally {
+    /// Takes the next sample.
+    pub fn see(&mut self, sample: &Sample) {
+        self.resting_since_s = if at_rest(sample) { self.resting_since_s.or(Some(sample.t_s)) } else { None };
+        let demands = sample.contacts.iter().map(friction_demand);
+        self.friction_demand_max = demands.fold(self.friction_demand_max, f64::max);
+        let now_j = sample.energy_j;
+        let first = (Energy { initial_j: now_j, ..Energy::default() }, f64::INFINITY);
+        let (energy, least_j) = self.energy.get_or_insert(first);
+        energy.final_j = now_j;
+        *least_j = least_j.min(now_j);
+        energy.increase_max_j = energy.increase_max_j.max(now_j - *least_j);
+    }
+
+    /// The verdict on a run whose last sample is `last`.
+    pub fn summary(self, ending: Ending, last: Option<&Sample>) -> Summary {
+        let settle_time_s = if ending.lost.is_none() { self.resting_since_s } else { None };
+        Summary {
             scene: ending.scene,
             duration_s: ending.duration_s,
             settled: settle_time_s.is_some(),
@@ -103,11 +126,9 @@ impl Summary {
             lost_at_s: ending.lost.map(|(t_s, _)| t_s),
             lost_reason: ending.lost.map(|(_, reason)| reason.to_string()),
             fault: ending.fault,
-            last: samples.last().map(Last::of).unwrap_or_default(),
-            friction_demand_max: largest(
-                samples.iter().flat_map(|sample| &sample.contacts).map(friction_demand),
-            ),
-            energy: Energy::of(samples),
+            last: last.map(Last::of).unwrap_or_default(),
+            friction_demand_max: self.friction_demand_max,
+            energy: self.energy.map(|(energy, _)| energy).unwrap_or_default(),
             wall_s: ending.wall_s,
             real_time_factor: ending.duration_s / ending.wall_s,
         }
@@ -129,25 +150,6 @@ impl Last {
             indentation_m: each(|c| c.indentation_m),
         }
     }
-}
-
-impl Energy {
-    fn of(samples: &[Sample]) -> Self {
-        let mut least = f64::INFINITY;
-        let mut increase_max_j: f64 = 0.0;
-        for sample in samples {
-            least = least.min(sample.energy_j);
-            increase_max_j = increase_max_j.max(sample.energy_j - least);
-        }
-        let at = |sample: Option<&Sample>| sample.map_or(0.0, |sample| sample.energy_j);
-        Self { initial_j: at(samples.first()), final_j: at(samples.last()), increase_max_j }
-    }
-}
-
-/// The time from which on everything was at rest, if it is at the end.
-fn settle_time_s(samples: &[Sample]) -> Option<f64> {
-    let resting = samples.iter().rev().take_while(|sample| at_rest(sample));
-    resting.last().map(|sample| sample.t_s)
 }
 
 fn at_rest(sample: &Sample) -> bool {

@@ -1,43 +1,10 @@
 //! The columns of a table: a row a record, with the names and units that the recording's own signals have.
 
 use crate::record::mcap::Decoded;
+use crate::record::table::{Cell, Kind};
 use crate::scene::suggestion;
 use blindgrasp_shared::event::Event;
 use blindgrasp_shared::fault::Raised;
-
-/// What a column holds.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Kind {
-    /// Whole numbers.
-    Whole,
-    /// Numbers of single precision.
-    Real,
-    /// Numbers of double precision.
-    Double,
-    /// True or false.
-    Truth,
-    /// Words.
-    Words,
-}
-
-/// A value in a row.
-#[derive(Clone, Debug, PartialEq)]
-pub enum Cell<'a> {
-    /// It was not sent, or is not known.
-    Missing,
-    /// A whole number.
-    Whole(i64),
-    /// A number of single precision.
-    Real(f32),
-    /// A number of double precision.
-    Double(f64),
-    /// True or false.
-    Truth(bool),
-    /// A word.
-    Word(&'a str),
-    /// Words made for it.
-    Text(String),
-}
 
 /// What limits a joint, by the bits of its limits.
 const LIMITED_BY: [&str; 16] = [

@@ -9,13 +9,13 @@
 //! - Numbers come out with all their bits. What is coarser in a recording is so because it was sent so.
 
 mod column;
-mod csv;
-mod parquet;
 
-pub use column::{Cell, Column, Kind, NoSuchColumn};
+pub use crate::record::table::{Cell, Format, Kind};
+pub use column::{Column, NoSuchColumn};
 
 use crate::record::mcap::{About, Decoded, Decoder, Entry, RecordingError, What};
-use std::io::{self, Write};
+use crate::record::table::{self, Heading, TableError};
+use std::io::Write;
 use std::sync::mpsc::{self, Receiver, SendError, SyncSender};
 use std::thread;
 
@@ -24,15 +24,6 @@ const BATCH: usize = 1024;
 const BATCHES: usize = 4;
 /// How much later than its tick a record may come, s.
 const LATEST_S: f64 = 2.0;
-
-/// A kind of file.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Format {
-    /// Comma-separated values.
-    Csv,
-    /// Parquet.
-    Parquet,
-}
 
 /// What to export.
 #[derive(Clone, Debug)]
@@ -75,14 +66,8 @@ pub enum ExportError {
     #[error("nothing in the recording says whose records these are: it has no session")]
     NoSession,
     /// It can't be written.
-    #[error("cannot write the table: {0}")]
-    Write(#[from] io::Error),
-    /// It can't be written.
-    #[error("cannot write the table: {0}")]
-    Csv(#[from] ::csv::Error),
-    /// It can't be written.
-    #[error("cannot write the table: {0}")]
-    Parquet(#[from] ::parquet::errors::ParquetError),
+    #[error(transparent)]
+    Table(#[from] TableError),
 }
 
 /// The columns of a table, and what their values are told by.
@@ -90,12 +75,34 @@ struct Layout {
     columns: Vec<Column>,
     start_ns: u64,
     joint_names: Vec<String>,
+    /// For the metadata.
+    about: Vec<(String, String)>,
 }
 
-/// A table that is being written.
-trait Table {
-    fn write(&mut self, rows: &[Decoded]) -> Result<(), ExportError>;
-    fn finish(self: Box<Self>) -> Result<(), ExportError>;
+impl table::Layout for Layout {
+    type Row = Decoded;
+
+    fn row_name(&self) -> &str {
+        "tick"
+    }
+
+    fn headings(&self) -> impl Iterator<Item = Heading<'_>> {
+        self.columns.iter().map(|column| Heading {
+            name: &column.name,
+            kind: column.kind,
+            unit: column.unit,
+            words: column.words,
+        })
+    }
+
+    #[inline]
+    fn cell<'a>(&'a self, row: &'a Decoded, column: usize) -> Cell<'a> {
+        self.columns[column].cell(row, self.start_ns, &self.joint_names)
+    }
+
+    fn about(&self) -> Vec<(String, String)> {
+        self.about.clone()
+    }
 }
 
 /// What goes from the reading thread to the writing one.
@@ -214,17 +221,15 @@ fn write(
     let Some(Batch::About(about)) = batches.iter().next() else { return Ok(()) };
     let columns = Column::chosen(&about.joint_names, &request.signals)?;
     let joint_names = about.joint_names.clone();
-    let layout = Layout { columns, start_ns: request.start_ns, joint_names };
-    let mut table: Box<dyn Table + '_> = match format {
-        Format::Csv => Box::new(csv::CsvTable::new(to, layout)?),
-        Format::Parquet => Box::new(parquet::ParquetTable::new(to, layout, metadata(&about, request))?),
-    };
+    let about = metadata(&about, request);
+    let mut table =
+        table::create(format, to, Layout { columns, start_ns: request.start_ns, joint_names, about })?;
     for batch in batches {
         if let Batch::Rows(rows) = batch {
             table.write(&rows)?;
         }
     }
-    table.finish()
+    Ok(table.finish()?)
 }
 
 /// What a table that describes itself says of its device.

@@ -1,8 +1,6 @@
-//! A table as Parquet: row groups of some ten thousand rows, snappy; units, versions and the hand in its metadata.
+//! A table as Parquet: row groups of some ten thousand rows, snappy; units and what the layout says in its metadata.
 
-use super::column::{Cell, Column, Kind};
-use super::{ExportError, Layout, Table};
-use crate::record::mcap::Decoded;
+use super::{Cell, Heading, Kind, Layout, Table, TableError};
 use parquet::basic::{Compression, ConvertedType, Encoding, LogicalType, Repetition, Type as Physical};
 use parquet::data_type::{BoolType, ByteArray, ByteArrayType, DataType, DoubleType, FloatType, Int64Type};
 use parquet::file::metadata::KeyValue;
@@ -16,9 +14,9 @@ use std::sync::Arc;
 const GROUP_ROWS: usize = 1 << 16;
 
 /// A table under way.
-pub(super) struct ParquetTable<W: Write + Send> {
+pub(super) struct ParquetTable<W: Write + Send, L> {
     writer: SerializedFileWriter<W>,
-    layout: Layout,
+    layout: L,
     buffers: Vec<Buffer>,
     rows: usize,
 }
@@ -38,24 +36,25 @@ enum Values {
     Words(Vec<ByteArray>),
 }
 
-impl<W: Write + Send> ParquetTable<W> {
-    /// Writes the beginning. `about` are keys and values for the metadata.
-    pub(super) fn new(to: W, layout: Layout, about: Vec<(String, String)>) -> Result<Self, ExportError> {
-        let fields = layout.columns.iter().map(field).collect::<Result<_, _>>()?;
-        let schema = Type::group_type_builder("tick").with_fields(fields).build()?;
-        let units = layout.columns.iter().map(|column| {
+impl<W: Write + Send, L: Layout> ParquetTable<W, L> {
+    /// Writes the beginning.
+    pub(super) fn new(to: W, layout: L) -> Result<Self, TableError> {
+        let fields = layout.headings().map(field).collect::<Result<_, _>>()?;
+        let schema = Type::group_type_builder(layout.row_name()).with_fields(fields).build()?;
+        let units = layout.headings().map(|column| {
             let unit = if column.unit.is_empty() { String::new() } else { format!("[{}] ", column.unit) };
             (format!("column {}", column.name), format!("{unit}{}", column.words))
         });
-        let metadata = about.into_iter().chain(units).map(|(key, value)| KeyValue::new(key, value)).collect();
+        let about = layout.about().into_iter();
+        let metadata = about.chain(units).map(|(key, value)| KeyValue::new(key, value)).collect();
         let mut properties = WriterProperties::builder()
             .set_compression(Compression::SNAPPY)
             .set_statistics_enabled(EnabledStatistics::Chunk)
             .set_max_row_group_row_count(Some(GROUP_ROWS))
             .set_created_by(concat!("blindgrasp ", env!("CARGO_PKG_VERSION")).to_owned())
             .set_key_value_metadata(Some(metadata));
-        for column in &layout.columns {
-            let path = ColumnPath::from(column.name.clone());
+        for column in layout.headings() {
+            let path = ColumnPath::from(column.name);
             let encoding = match column.kind {
                 Kind::Whole => Encoding::DELTA_BINARY_PACKED,
                 // Neighbours share their exponents: byte by byte they compress.
@@ -69,12 +68,12 @@ impl<W: Write + Send> ParquetTable<W> {
                 .set_column_encoding(path, encoding);
         }
         let writer = SerializedFileWriter::new(to, Arc::new(schema), Arc::new(properties.build()))?;
-        let buffers = layout.columns.iter().map(|column| Buffer::new(column.kind)).collect();
+        let buffers = layout.headings().map(|column| Buffer::new(column.kind)).collect();
         Ok(Self { writer, layout, buffers, rows: 0 })
     }
 
     /// Writes the row group.
-    fn flush(&mut self) -> Result<(), ExportError> {
+    fn flush(&mut self) -> Result<(), TableError> {
         if self.rows == 0 {
             return Ok(());
         }
@@ -88,15 +87,14 @@ impl<W: Write + Send> ParquetTable<W> {
     }
 }
 
-impl<W: Write + Send> Table for ParquetTable<W> {
-    fn write(&mut self, rows: &[Decoded]) -> Result<(), ExportError> {
+impl<W: Write + Send, L: Layout> Table<L::Row> for ParquetTable<W, L> {
+    fn write(&mut self, rows: &[L::Row]) -> Result<(), TableError> {
         let mut rows = rows;
         while !rows.is_empty() {
             let (now, later) = rows.split_at(rows.len().min(GROUP_ROWS - self.rows));
-            let Layout { columns, start_ns, joint_names } = &self.layout;
-            for (column, buffer) in columns.iter().zip(&mut self.buffers) {
+            for (column, buffer) in self.buffers.iter_mut().enumerate() {
                 for row in now {
-                    buffer.push(column.cell(row, *start_ns, joint_names));
+                    buffer.push(self.layout.cell(row, column));
                 }
             }
             self.rows += now.len();
@@ -108,7 +106,7 @@ impl<W: Write + Send> Table for ParquetTable<W> {
         Ok(())
     }
 
-    fn finish(mut self: Box<Self>) -> Result<(), ExportError> {
+    fn finish(mut self: Box<Self>) -> Result<(), TableError> {
         self.flush()?;
         self.writer.close()?;
         Ok(())
@@ -151,7 +149,7 @@ impl Buffer {
     fn write<W: Write + Send>(
         &mut self,
         group: &mut SerializedRowGroupWriter<'_, W>,
-    ) -> Result<(), ExportError> {
+    ) -> Result<(), TableError> {
         let present = &mut self.present;
         match &mut self.values {
             Values::Whole(values) => column::<Int64Type, W>(group, values, present)?,
@@ -174,7 +172,7 @@ fn column<T: DataType, W: Write + Send>(
     group: &mut SerializedRowGroupWriter<'_, W>,
     values: &mut Vec<T::T>,
     present: &mut Vec<i16>,
-) -> Result<(), ExportError> {
+) -> Result<(), TableError> {
     if let Some(mut column) = group.next_column()? {
         column.typed::<T>().write_batch(values, Some(present), None)?;
         column.close()?;
@@ -185,7 +183,7 @@ fn column<T: DataType, W: Write + Send>(
 }
 
 /// A column in the schema; every value may be missing.
-fn field(column: &Column) -> Result<Arc<Type>, ExportError> {
+fn field(column: Heading<'_>) -> Result<Arc<Type>, TableError> {
     let (physical, logical) = match column.kind {
         Kind::Whole => (Physical::INT64, None),
         Kind::Real => (Physical::FLOAT, None),
@@ -194,7 +192,7 @@ fn field(column: &Column) -> Result<Arc<Type>, ExportError> {
         Kind::Words => (Physical::BYTE_ARRAY, Some(LogicalType::String)),
     };
     let converted = if logical.is_some() { ConvertedType::UTF8 } else { ConvertedType::NONE };
-    let field = Type::primitive_type_builder(&column.name, physical)
+    let field = Type::primitive_type_builder(column.name, physical)
         .with_repetition(Repetition::OPTIONAL)
         .with_logical_type(logical)
         .with_converted_type(converted)

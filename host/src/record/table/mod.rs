@@ -1,0 +1,138 @@
+//! Tables in files, of whatever a [`Layout`] makes rows of: CSV, and Parquet with units and more in its metadata.
+
+mod csv;
+mod parquet;
+
+use std::io::{self, Write};
+
+/// A kind of file.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Format {
+    /// Comma-separated values.
+    Csv,
+    /// Parquet.
+    Parquet,
+}
+
+/// What a column holds.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Kind {
+    /// Whole numbers.
+    Whole,
+    /// Numbers of single precision.
+    Real,
+    /// Numbers of double precision.
+    Double,
+    /// True or false.
+    Truth,
+    /// Words.
+    Words,
+}
+
+/// A value in a row.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Cell<'a> {
+    /// It was not sent, or is not known.
+    Missing,
+    /// A whole number.
+    Whole(i64),
+    /// A number of single precision.
+    Real(f32),
+    /// A number of double precision.
+    Double(f64),
+    /// True or false.
+    Truth(bool),
+    /// A word.
+    Word(&'a str),
+    /// Words made for it.
+    Text(String),
+}
+
+/// What is said of a column.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Heading<'a> {
+    /// Its name.
+    pub name: &'a str,
+    /// What it holds.
+    pub kind: Kind,
+    /// Its unit; empty for what has none.
+    pub unit: &'a str,
+    /// What it is.
+    pub words: &'a str,
+}
+
+/// What a table's rows are made of.
+pub trait Layout {
+    /// What a row is made of.
+    type Row;
+
+    /// What a row is, in a word.
+    fn row_name(&self) -> &str;
+
+    /// The columns.
+    fn headings(&self) -> impl Iterator<Item = Heading<'_>>;
+
+    /// The value of a column, by its number, in a row.
+    fn cell<'a>(&'a self, row: &'a Self::Row, column: usize) -> Cell<'a>;
+
+    /// Keys and values for the metadata of a file that has them.
+    fn about(&self) -> Vec<(String, String)>;
+}
+
+/// A table that is being written.
+pub trait Table<R> {
+    /// Writes rows.
+    ///
+    /// # Errors
+    /// They can't be written.
+    fn write(&mut self, rows: &[R]) -> Result<(), TableError>;
+
+    /// Writes what is left.
+    ///
+    /// # Errors
+    /// It can't be written.
+    fn finish(self: Box<Self>) -> Result<(), TableError>;
+}
+
+/// Why a table can't be written.
+#[derive(Debug, thiserror::Error)]
+pub enum TableError {
+    /// The file system said no.
+    #[error("cannot write the table: {0}")]
+    Write(#[from] io::Error),
+    /// The file system said no, or a row has other columns than the header.
+    #[error("cannot write the table: {0}")]
+    Csv(#[from] ::csv::Error),
+    /// The file system said no, or Parquet can't express it.
+    #[error("cannot write the table: {0}")]
+    Parquet(#[from] ::parquet::errors::ParquetError),
+}
+
+impl TableError {
+    /// Whether the reader of a pipe has seen enough.
+    pub fn is_broken_pipe(&self) -> bool {
+        let is_it = |error: &io::Error| error.kind() == io::ErrorKind::BrokenPipe;
+        match self {
+            Self::Write(error) => is_it(error),
+            Self::Csv(error) => matches!(error.kind(), ::csv::ErrorKind::Io(error) if is_it(error)),
+            Self::Parquet(error) => {
+                std::error::Error::source(error).and_then(|source| source.downcast_ref()).is_some_and(is_it)
+            }
+        }
+    }
+}
+
+/// Begins a table.
+///
+/// # Errors
+/// It can't be written.
+pub fn create<'a, L: Layout + 'a>(
+    format: Format,
+    to: impl Write + Send + 'a,
+    layout: L,
+) -> Result<Box<dyn Table<L::Row> + 'a>, TableError> {
+    Ok(match format {
+        Format::Csv => Box::new(csv::CsvTable::new(to, layout)?),
+        Format::Parquet => Box::new(parquet::ParquetTable::new(to, layout)?),
+    })
+}

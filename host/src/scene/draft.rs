@@ -1,0 +1,58 @@
+//! A scene whose files have been read, before its settings: so that it can be made with many settings, all from the same
+//! files.
+
+use super::error::SceneError;
+use super::library::{self, Document, Kind};
+use super::tree::{Node, Setting};
+use super::{Place, Scene, SceneFile, build, read};
+use std::path::Path;
+
+/// A scene before its settings.
+#[derive(Clone, Debug)]
+pub struct Draft {
+    tree: Node,
+}
+
+impl Draft {
+    /// Reads a scene by its built-in name or by its path, and the hand and the object that it refers to, or that settings
+    /// name instead. Other settings do nothing here.
+    ///
+    /// # Errors
+    /// One line: where, which key, what is wrong, what to do.
+    pub fn open(name_or_path: &str, settings: &[Setting]) -> Result<Self, SceneError> {
+        let document = Document::open(Kind::Scene, name_or_path, Path::new(""))
+            .map_err(|error| error.at(&Place::whole(name_or_path)))?;
+        Self::of(document, settings)
+    }
+
+    pub(super) fn of(document: Document, settings: &[Setting]) -> Result<Self, SceneError> {
+        Ok(Self { tree: document.follow(settings)? })
+    }
+
+    /// The effective configuration with settings; those of hand and object do nothing any more. Whether it can be run is not
+    /// known yet.
+    ///
+    /// # Errors
+    /// One line: where, which key, what is wrong, what to do.
+    pub fn file(&self, settings: &[Setting]) -> Result<SceneFile, SceneError> {
+        read::read(&self.set(settings)?, "")
+    }
+
+    /// The scene with settings; those of hand and object do nothing any more.
+    ///
+    /// # Errors
+    /// One line: where, which key, what is wrong, what to do.
+    pub fn scene(&self, settings: &[Setting]) -> Result<Scene, SceneError> {
+        let tree = self.set(settings)?;
+        build::scene(read::read(&tree, "")?).map_err(|error| {
+            let place = tree.place_of(&error.key).clone();
+            error.at(&place)
+        })
+    }
+
+    fn set(&self, settings: &[Setting]) -> Result<Node, SceneError> {
+        let mut tree = self.tree.clone();
+        library::apply(&mut tree, settings)?;
+        Ok(tree)
+    }
+}
