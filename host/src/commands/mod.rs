@@ -12,6 +12,7 @@ pub(crate) mod replay;
 #[cfg(unix)]
 pub(crate) mod serve;
 pub(crate) mod sim;
+pub(crate) mod sweep;
 
 /// How a command ended that was not misused.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -1,82 +1,25 @@
-//! Draws a figure with Plotters, once as a bitmap and once as SVG.
+//! Draws a figure of panels over time.
 
-use super::backend::Pen;
-use super::canvas::Canvas;
+use super::axes::{Chart, Frame, Ruler};
+use super::drawing::{self, Drawing, TITLE_HEIGHT, WIDTH};
 use super::figure::{Axis, Figure, Line, Panel};
-use super::palette::{FAINT_INK, GRID, INK};
+use super::palette::FAINT_INK;
 use super::pens::{LABEL_SIZE, ink, letters, pen, reason};
-use super::{legend, series, text};
+use super::{legend, series};
 use plotters::coord::Shift;
-use plotters::coord::cartesian::Cartesian2d;
-use plotters::coord::ranged1d::{DefaultFormatting, KeyPointHint, Ranged};
-use plotters::prelude::{
-    ChartBuilder, ChartContext, Circle, DrawingArea, DrawingBackend, IntoDrawingArea, LabelAreaPosition,
-    LineSeries, PathElement, SVGBackend, Text, WHITE,
-};
-use plotters::style::text_anchor::{HPos, Pos, VPos};
-use std::ops::Range;
+use plotters::prelude::{Circle, DrawingArea, DrawingBackend, LineSeries, PathElement, Text};
 
-/// Sizes below are in pixels of the finished picture. Bitmaps are drawn this much larger and averaged down; SVG files,
-/// in which Plotters rounds to whole units, count in fractions of a pixel.
-const BITMAP_SCALE: i32 = 3;
-const SVG_SCALE: i32 = 4;
-
-const WIDTH: i32 = 960;
-const TITLE_HEIGHT: i32 = 46;
 const TIME_LABELS_HEIGHT: i32 = 42;
 const VALUE_LABELS_WIDTH: i32 = 74;
-/// Left of the rotated label, which Plotters sets flush.
-const VALUE_MARGIN: i32 = 8;
-const TITLE_SIZE: i32 = 21;
 
-impl Figure {
-    /// The figure as a PNG file.
-    pub(super) fn png(&self) -> Result<Vec<u8>, String> {
-        let (width, height) = self.size(BITMAP_SCALE);
-        let mut canvas = Canvas::new(width as usize, height as usize);
-        let root = Pen(&mut canvas).into_drawing_area();
-        self.draw(&root, BITMAP_SCALE)?;
-        drop(root);
-        canvas.reduced(BITMAP_SCALE as usize).png().map_err(reason)
-    }
-
-    /// The figure as an SVG file.
-    pub(super) fn svg(&self) -> Result<Vec<u8>, String> {
-        let (width, height) = self.size(SVG_SCALE);
-        let mut file = String::new();
-        let root = SVGBackend::with_string(&mut file, (width, height)).into_drawing_area();
-        self.draw(&root, SVG_SCALE)?;
-        drop(root);
-        // The size in which a viewer shows it; the view box keeps the fine units.
-        let fine = format!("width=\"{width}\" height=\"{height}\" viewBox");
-        let shown = self.size(1);
-        Ok(file
-            .replacen(&fine, &format!("width=\"{}\" height=\"{}\" viewBox", shown.0, shown.1), 1)
-            .into_bytes())
-    }
-
-    /// Width and height.
-    pub(super) fn size(&self, scale: i32) -> (u32, u32) {
+impl Drawing for Figure {
+    fn size(&self) -> (i32, i32) {
         let panels: i32 = (0..self.panels.len()).map(|k| self.panel_height(k)).sum();
-        ((WIDTH * scale) as u32, ((TITLE_HEIGHT + panels + TIME_LABELS_HEIGHT) * scale) as u32)
-    }
-
-    fn panel_height(&self, k: usize) -> i32 {
-        let usual = match self.panels.len() {
-            0..=2 => 260,
-            3 => 205,
-            _ => 175,
-        };
-        let lines = self.panels.get(k).map_or(0, |panel| panel.lines.len() as i32);
-        usual.max((lines + 2) * legend::PITCH)
+        (WIDTH, TITLE_HEIGHT + panels + TIME_LABELS_HEIGHT)
     }
 
     fn draw<B: DrawingBackend>(&self, root: &DrawingArea<B, Shift>, scale: i32) -> Result<(), String> {
-        text::register_with_plotters();
-        root.fill(&WHITE).map_err(reason)?;
-        let title = letters(TITLE_SIZE, scale, INK).pos(Pos::new(HPos::Left, VPos::Center));
-        let corner = (VALUE_LABELS_WIDTH * scale, TITLE_HEIGHT / 2 * scale);
-        root.draw(&Text::new(text::shortened(&self.title, 72), corner, title)).map_err(reason)?;
+        drawing::begin(root, &self.title, VALUE_LABELS_WIDTH, scale)?;
         let mut top = TITLE_HEIGHT;
         for (k, panel) in self.panels.iter().enumerate() {
             let last = k + 1 == self.panels.len();
@@ -90,6 +33,18 @@ impl Figure {
         }
         root.present().map_err(reason)
     }
+}
+
+impl Figure {
+    fn panel_height(&self, k: usize) -> i32 {
+        let usual = match self.panels.len() {
+            0..=2 => 260,
+            3 => 205,
+            _ => 175,
+        };
+        let lines = self.panels.get(k).map_or(0, |panel| panel.lines.len() as i32);
+        usual.max((lines + 2) * legend::PITCH)
+    }
 
     fn draw_panel<B: DrawingBackend>(
         &self,
@@ -98,57 +53,45 @@ impl Figure {
         last: bool,
         scale: i32,
     ) -> Result<(), String> {
+        let labelled = |ticks: Vec<f64>, label: &dyn Fn(f64, &[f64]) -> String| {
+            ticks.iter().map(|&tick| (tick, label(tick, &ticks))).collect()
+        };
         let time = series::to_next_tick(series::time_range(&self.times), 8);
-        let time_ticks = series::ticks(&time, 8);
+        let time = Ruler {
+            words: "time, s".into(),
+            ticks: labelled(series::ticks(&time, 8), &series::label),
+            range: time,
+        };
         let (range, ticks, prefix, factor) = match &panel.axis {
             Axis::Linear(range) => {
                 let (prefix, factor) = series::prefix(range.start.abs().max(range.end.abs()));
                 let range = range.start * factor..range.end * factor;
-                let ticks = series::ticks(&range, 6);
+                let ticks = labelled(series::ticks(&range, 6), &series::label);
                 (range, ticks, prefix, factor)
             }
             Axis::Decades(range) => {
                 let range = range.as_ref().unwrap_or(&(-3.0..0.0));
                 let ticks = series::ticks(range, 5).into_iter().filter(|tick| tick.fract() == 0.0).collect();
+                let ticks = labelled(ticks, &|tick, _| series::power_label(tick));
                 (range.start - 0.1..range.end + 0.1, ticks, "", 1.0)
             }
         };
-        let mut chart = ChartBuilder::on(area)
-            .margin_top(7 * scale)
-            .margin_bottom(if last { 2 * scale } else { 7 * scale })
-            .margin_left(VALUE_MARGIN * scale)
-            .margin_right(14 * scale)
-            .set_label_area_size(LabelAreaPosition::Left, (VALUE_LABELS_WIDTH - VALUE_MARGIN) * scale)
-            .set_label_area_size(
-                LabelAreaPosition::Bottom,
-                if last { (TIME_LABELS_HEIGHT - 2) * scale } else { 0 },
-            )
-            .build_cartesian_2d(
-                Ticked { range: time.clone(), ticks: time_ticks.clone() },
-                Ticked { range: range.clone(), ticks: ticks.clone() },
-            )
-            .map_err(reason)?;
-        let decades = matches!(panel.axis, Axis::Decades(_));
-        let value_label = |tick: &f64| match decades {
-            true => series::power_label(*tick),
-            false => series::label(*tick, &ticks),
+        let words = format!("{}, {prefix}{}", panel.quantity, panel.unit);
+        let values = Ruler { words, range: range.clone(), ticks };
+        let frame = Frame {
+            left: VALUE_LABELS_WIDTH,
+            right: 14,
+            top: 7,
+            bottom: if last { 2 } else { 7 },
+            labels: if last { TIME_LABELS_HEIGHT - 2 } else { 0 },
         };
-        chart
-            .configure_mesh()
-            .bold_line_style(ink(GRID, scale as u32))
-            .light_line_style(ink(GRID, 0))
-            .max_light_lines(0)
-            .axis_style(ink(FAINT_INK, scale as u32))
-            .label_style(letters(LABEL_SIZE, scale, INK))
-            .axis_desc_style(letters(LABEL_SIZE, scale, INK))
-            .x_label_formatter(&|tick| series::label(*tick, &time_ticks))
-            .y_label_formatter(&value_label)
-            .x_desc(if last { "time, s" } else { "" })
-            .y_desc(format!("{}, {prefix}{}", panel.quantity, panel.unit))
-            .draw()
-            .map_err(reason)?;
+        let mut chart = frame.draw(area, (&time, &values), scale)?;
+        let decades = matches!(panel.axis, Axis::Decades(_));
         if !decades {
-            let zero = PathElement::new([(time.start, 0.0), (time.end, 0.0)], ink(FAINT_INK, scale as u32));
+            let zero = PathElement::new(
+                [(time.range.start, 0.0), (time.range.end, 0.0)],
+                ink(FAINT_INK, scale as u32),
+            );
             chart.draw_series([zero]).map_err(reason)?;
         }
         if panel.axis == Axis::Decades(None) {
@@ -173,33 +116,9 @@ impl Figure {
     }
 }
 
-/// A linear axis with its ticks where we want them.
-struct Ticked {
-    range: Range<f64>,
-    ticks: Vec<f64>,
-}
-
-impl Ranged for Ticked {
-    type FormatOption = DefaultFormatting;
-    type ValueType = f64;
-
-    fn map(&self, value: &f64, (from, to): (i32, i32)) -> i32 {
-        let share = (value - self.range.start) / (self.range.end - self.range.start);
-        from + (share * f64::from(to - from)).round() as i32
-    }
-
-    fn key_points<H: KeyPointHint>(&self, hint: H) -> Vec<f64> {
-        if hint.weight().allow_light_points() { Vec::new() } else { self.ticks.clone() }
-    }
-
-    fn range(&self) -> Range<f64> {
-        self.range.clone()
-    }
-}
-
 /// Draws one unbroken stretch of a signal.
 fn draw_line<B: DrawingBackend>(
-    chart: &mut ChartContext<'_, B, Cartesian2d<Ticked, Ticked>>,
+    chart: &mut Chart<'_, B>,
     points: Vec<(f64, f64)>,
     line: &Line,
     scale: i32,

@@ -16,10 +16,12 @@
 //! `text` are the bitmap under all of it.
 
 mod animation;
+mod axes;
 mod backend;
 mod camera;
 mod canvas;
 mod chart;
+mod drawing;
 mod figure;
 #[cfg(test)]
 mod fixture;
@@ -36,12 +38,14 @@ mod raster;
 mod scene3d;
 mod series;
 mod skeleton;
+pub mod sweep;
 #[cfg(test)]
 mod tests;
 mod text;
 
 pub use input::Report;
 
+use drawing::Drawing as _;
 use std::path::{Path, PathBuf};
 use std::{fs, io};
 

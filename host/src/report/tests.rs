@@ -1,5 +1,6 @@
 //! Every file of a report: there, whole, the same twice, and an error where it can't be.
 
+use super::drawing::Drawing as _;
 use super::{Report, ReportError, animation, fixture, picture, plots, write};
 use crate::record::sample::Sample;
 use nalgebra::{Matrix3, Vector3};

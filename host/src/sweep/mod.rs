@@ -20,12 +20,24 @@
 //! ```
 
 mod axis;
+mod edge;
+mod identity;
+mod journal;
+mod output;
+mod overview;
+mod picture;
 mod plan;
 mod run;
+mod table;
 #[cfg(test)]
 mod tests;
 mod unit;
 
 pub use axis::{Axis, AxisError, Scale, Value};
+pub use edge::{Edge, Swept, edges, run_refined};
+pub use identity::Identity;
+pub use journal::{Found, Journal, JournalError};
+pub use output::{Output, OutputError};
+pub use overview::{Overview, Varied};
 pub use plan::{Plan, PlanError};
 pub use run::{Outcome, Row, run, run_some};

@@ -1,6 +1,7 @@
 //! A sweep before it is run: the scene, what is set, what is varied, and from these the settings of every run.
 
 use super::axis::{Axis, Value};
+use crate::record::table::Kind;
 use crate::scene::{Draft, Scene, SceneError, SceneFile, Setting, is_reference};
 use thiserror::Error;
 
@@ -17,6 +18,8 @@ pub struct Plan {
     settings: Vec<Setting>,
     axes: Vec<Axis>,
     seeds: u32,
+    /// Runs of the grid; those after these were added.
+    grid: usize,
     /// The scene with each combination of hands and objects that axes name.
     drafts: Vec<Opened>,
 }
@@ -25,8 +28,8 @@ pub struct Plan {
 #[derive(Clone, Debug)]
 struct Opened {
     draft: Result<Draft, SceneError>,
-    /// The first run of it that can be read, and its effective configuration.
-    first: Option<(usize, SceneFile)>,
+    /// The first run of it that can be read, and its effective configuration; or why not even the first one can be.
+    first: Result<(usize, SceneFile), SceneError>,
 }
 
 /// Why a sweep can't be run at all.
@@ -43,7 +46,7 @@ pub enum PlanError {
     /// There are too many.
     #[error("--vary: the values combine to more than {MOST_RUNS} runs; give fewer")]
     TooMany,
-    /// Not a single run can be read.
+    /// The scene refuses every run; of the first one, why.
     #[error(transparent)]
     Scene(#[from] SceneError),
 }
@@ -53,8 +56,8 @@ impl Plan {
     /// values is run with `seeds` seeds, counted up from the scene's.
     ///
     /// # Errors
-    /// A key stands twice; there are too many runs; or not a single run can be read: a key that no scene knows, or values that
-    /// none can take. That a scene refuses some of the values is no error but what came of their runs.
+    /// A key stands twice; there are too many runs; or the scene refuses every single one: it does not know the key, or can't
+    /// take any of the values. That it refuses some of them is no error but what comes of their runs.
     pub fn new(scene: &str, settings: Vec<Setting>, axes: Vec<Axis>, seeds: u32) -> Result<Self, PlanError> {
         for (k, Axis { key, .. }) in axes.iter().enumerate() {
             let problem = if axes[..k].iter().any(|axis| axis.key == *key) {
@@ -73,51 +76,53 @@ impl Plan {
         if runs > MOST_RUNS {
             return Err(PlanError::TooMany);
         }
+        let drafts = Vec::new();
         let mut plan =
-            Self { scene: scene.to_owned(), settings, axes, seeds: seeds.max(1), drafts: Vec::new() };
-        plan.open()?;
-        Ok(plan)
+            Self { scene: scene.to_owned(), settings, axes, seeds: seeds.max(1), grid: runs, drafts };
+        plan.open();
+        match plan.scene(0) {
+            Err(error) if !(1..plan.runs()).any(|run| plan.scene(run).is_ok()) => Err(error.into()),
+            _ => Ok(plan),
+        }
     }
 
-    /// Reads the scene's files, and finds out what can be read at all.
-    fn open(&mut self) -> Result<(), SceneError> {
+    /// Reads the scene's files, and finds out what can be read of them at all.
+    fn open(&mut self) {
         let references = self.axes.iter().filter(|axis| is_reference(&axis.key));
         let mut drafts = vec![None; references.map(|axis| axis.values.len()).product()];
-        let mut missing = drafts.len();
-        let mut first_error = None;
         for run in 0..self.runs() {
             let settings = self.settings_without_seed(run);
-            let opened = drafts[self.draft_number(run)]
-                .get_or_insert_with(|| Opened { draft: Draft::open(&self.scene, &settings), first: None });
-            if opened.first.is_some() {
-                continue;
-            }
-            match opened.draft.as_ref().map_err(SceneError::clone).and_then(|draft| draft.file(&settings)) {
-                Ok(file) => {
-                    opened.first = Some((run, file));
-                    missing -= 1;
-                    if missing == 0 {
-                        break;
-                    }
+            let file = |draft: &Result<Draft, SceneError>| {
+                Ok((run, draft.as_ref().map_err(SceneError::clone)?.file(&settings)?))
+            };
+            match &mut drafts[self.draft_number(run)] {
+                Some(Opened { first: Ok(_), .. }) => continue,
+                Some(Opened { draft, first }) => *first = file(draft).or(first.clone()),
+                unopened => {
+                    let draft = Draft::open(&self.scene, &settings);
+                    *unopened = Some(Opened { first: file(&draft), draft });
                 }
-                Err(error) => first_error = first_error.or(Some(error)),
+            }
+            if drafts.iter().all(|opened| matches!(opened, Some(Opened { first: Ok(_), .. }))) {
+                break;
             }
         }
         self.drafts = drafts.into_iter().flatten().collect();
-        match first_error {
-            Some(error) if self.first().is_none() => Err(error),
-            _ => Ok(()),
-        }
     }
 
-    /// The scene's name or path.
-    pub fn scene_name(&self) -> &str {
-        &self.scene
+    /// The scene's name.
+    pub fn name(&self) -> &str {
+        self.first().map_or(&self.scene, |file| &file.name)
     }
 
     /// What is varied.
     pub fn axes(&self) -> &[Axis] {
         &self.axes
+    }
+
+    /// What is set for all runs.
+    pub fn base_settings(&self) -> &[Setting] {
+        &self.settings
     }
 
     /// How many seeds each combination is run with.
@@ -128,6 +133,11 @@ impl Plan {
     /// How many runs there are.
     pub fn runs(&self) -> usize {
         self.axes.iter().map(|axis| axis.values.len()).product::<usize>() * self.seeds as usize
+    }
+
+    /// How many of them were added by bisection.
+    pub fn added(&self) -> usize {
+        self.runs() - self.grid
     }
 
     /// The number of the value that each axis has in a run.
@@ -186,8 +196,41 @@ impl Plan {
 
     /// The effective configuration of the first run that has one, with the scene's own seed.
     pub fn first(&self) -> Option<&SceneFile> {
-        let firsts = self.drafts.iter().filter_map(|opened| opened.first.as_ref());
+        let firsts = self.drafts.iter().filter_map(|opened| opened.first.as_ref().ok());
         firsts.min_by_key(|(run, _)| *run).map(|(_, file)| file)
+    }
+
+    /// What the scene's files say, for each hand and object that axes name: an effective configuration, or an error. What
+    /// settings and axes change is in it as the first run has it.
+    pub(super) fn contents(&self) -> Vec<String> {
+        let content = |opened: &Opened| match &opened.first {
+            Ok((_, file)) => toml::to_string(file).unwrap_or_default(),
+            Err(error) => error.to_string(),
+        };
+        self.drafts.iter().map(content).collect()
+    }
+
+    /// What the values of an axis are. Numbers are whole if that is what the key takes.
+    pub fn kind(&self, axis: usize) -> Kind {
+        let Axis { key, values, .. } = &self.axes[axis];
+        let effective = || self.first().and_then(|file| toml::Value::try_from(file).ok());
+        if values.iter().all(|value| value.text == "true" || value.text == "false") {
+            Kind::Truth
+        } else if !self.axes[axis].is_numeric() {
+            Kind::Words
+        } else if effective().is_some_and(|value| matches!(below(&value, key), Some(toml::Value::Integer(_))))
+        {
+            Kind::Whole
+        } else {
+            Kind::Double
+        }
+    }
+
+    /// Adds values to the only axis, behind all others. The runs before keep their numbers.
+    pub(super) fn add(&mut self, values: Vec<Value>) {
+        if let [axis] = self.axes.as_mut_slice() {
+            axis.values.extend(values);
+        }
     }
 
     fn draft(&self, run: usize) -> Result<&Draft, SceneError> {
@@ -198,4 +241,17 @@ impl Plan {
         let references = self.axes.iter().zip(self.place(run)).filter(|(axis, _)| is_reference(&axis.key));
         references.fold(0, |number, (axis, k)| number * axis.values.len() + k)
     }
+}
+
+/// The value of a key as `--set` takes it; of all items of a list, the first.
+fn below<'a>(value: &'a toml::Value, key: &str) -> Option<&'a toml::Value> {
+    key.split('.').try_fold(value, |value, name| match value {
+        toml::Value::Table(table) => table.get(name),
+        toml::Value::Array(items) => match name.parse::<usize>() {
+            Ok(number) => items.get(number.checked_sub(1)?),
+            Err(_) if name == "*" => items.first(),
+            Err(_) => items.iter().find(|item| item.get("name").and_then(toml::Value::as_str) == Some(name)),
+        },
+        _ => None,
+    })
 }

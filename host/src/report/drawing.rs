@@ -1,0 +1,67 @@
+//! What every figure that Plotters draws has in common: a bitmap and an SVG file of the same picture, and its title.
+
+use super::backend::Pen;
+use super::canvas::Canvas;
+use super::palette::INK;
+use super::pens::{letters, reason};
+use super::text;
+use plotters::coord::Shift;
+use plotters::prelude::{DrawingArea, DrawingBackend, IntoDrawingArea, SVGBackend, Text, WHITE};
+use plotters::style::text_anchor::{HPos, Pos, VPos};
+
+/// Sizes are in pixels of the finished picture. Bitmaps are drawn this much larger and averaged down; SVG files, in which
+/// Plotters rounds to whole units, count in fractions of a pixel.
+const BITMAP_SCALE: i32 = 3;
+const SVG_SCALE: i32 = 4;
+
+pub(super) const WIDTH: i32 = 960;
+pub(super) const TITLE_HEIGHT: i32 = 46;
+const TITLE_SIZE: i32 = 21;
+
+/// A figure.
+pub(super) trait Drawing {
+    /// Width and height, pixels.
+    fn size(&self) -> (i32, i32);
+
+    /// Draws it, in pixels times a scale.
+    fn draw<B: DrawingBackend>(&self, root: &DrawingArea<B, Shift>, scale: i32) -> Result<(), String>;
+
+    /// The figure as a PNG file.
+    fn png(&self) -> Result<Vec<u8>, String> {
+        let (width, height) = self.size();
+        let pixels = |length: i32| (length * BITMAP_SCALE) as usize;
+        let mut canvas = Canvas::new(pixels(width), pixels(height));
+        let root = Pen(&mut canvas).into_drawing_area();
+        self.draw(&root, BITMAP_SCALE)?;
+        drop(root);
+        canvas.reduced(BITMAP_SCALE as usize).png().map_err(reason)
+    }
+
+    /// The figure as an SVG file.
+    fn svg(&self) -> Result<Vec<u8>, String> {
+        let shown = self.size();
+        let (width, height) = ((shown.0 * SVG_SCALE) as u32, (shown.1 * SVG_SCALE) as u32);
+        let mut file = String::new();
+        let root = SVGBackend::with_string(&mut file, (width, height)).into_drawing_area();
+        self.draw(&root, SVG_SCALE)?;
+        drop(root);
+        // The size in which a viewer shows it; the view box keeps the fine units.
+        let fine = format!("width=\"{width}\" height=\"{height}\" viewBox");
+        let coarse = format!("width=\"{}\" height=\"{}\" viewBox", shown.0, shown.1);
+        Ok(file.replacen(&fine, &coarse, 1).into_bytes())
+    }
+}
+
+/// White paper, and the title, so many pixels from the left.
+pub(super) fn begin<B: DrawingBackend>(
+    root: &DrawingArea<B, Shift>,
+    title: &str,
+    left: i32,
+    scale: i32,
+) -> Result<(), String> {
+    text::register_with_plotters();
+    root.fill(&WHITE).map_err(reason)?;
+    let style = letters(TITLE_SIZE, scale, INK).pos(Pos::new(HPos::Left, VPos::Center));
+    let corner = (left * scale, TITLE_HEIGHT / 2 * scale);
+    root.draw(&Text::new(text::shortened(title, 72), corner, style)).map_err(reason)
+}

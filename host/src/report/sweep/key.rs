@@ -1,0 +1,74 @@
+//! The key at the side of a picture: colours and what they mean.
+
+use super::super::palette::{FAINT_INK, INK, Rgb};
+use super::super::pens::{LABEL_SIZE, ink, letters, reason};
+use super::super::series;
+use super::ramp::Ramp;
+use plotters::coord::Shift;
+use plotters::prelude::{DrawingArea, DrawingBackend, PathElement, Rectangle, Text};
+use plotters::style::text_anchor::{HPos, Pos, VPos};
+
+pub(super) const WIDTH: i32 = 182;
+const LEFT: i32 = 10;
+const BAR_WIDTH: i32 = 18;
+const BAR_HEIGHT: i32 = 112;
+const PITCH: i32 = 19;
+
+/// A key that is being drawn, from the top down.
+pub(super) struct Key<'a, B: DrawingBackend> {
+    area: &'a DrawingArea<B, Shift>,
+    scale: i32,
+    y: i32,
+}
+
+impl<'a, B: DrawingBackend> Key<'a, B> {
+    pub(super) fn new(area: &'a DrawingArea<B, Shift>, scale: i32) -> Self {
+        Self { area, scale, y: 14 }
+    }
+
+    /// A heading and a bar of colours with its numbers, seconds.
+    pub(super) fn ramp(&mut self, heading: &str, ramp: &Ramp) -> Result<(), String> {
+        self.words(LEFT, self.y, heading)?;
+        let top = self.y + 18;
+        let (scale, height) = (self.scale, BAR_HEIGHT * self.scale);
+        let value = |share: f64| ramp.range.start + (ramp.range.end - ramp.range.start) * share;
+        for row in 0..height {
+            let colour = ramp.colour(value(1.0 - (f64::from(row) + 0.5) / f64::from(height)));
+            let (left, y) = (LEFT * scale, top * scale + row);
+            self.fill((left, y), (left + BAR_WIDTH * scale, y + 1), colour)?;
+        }
+        let ticks = series::ticks(&ramp.range, 4);
+        for &tick in &ticks {
+            let share = (tick - ramp.range.start) / (ramp.range.end - ramp.range.start);
+            let y = top + (f64::from(BAR_HEIGHT) * (1.0 - share)).round() as i32;
+            let right = LEFT + BAR_WIDTH;
+            let line = [(right * scale, y * scale), ((right + 5) * scale, y * scale)];
+            self.area.draw(&PathElement::new(line, ink(FAINT_INK, scale as u32))).map_err(reason)?;
+            self.words(right + 10, y, &format!("{} s", series::label(tick, &ticks)))?;
+        }
+        self.y = top + BAR_HEIGHT + 28;
+        Ok(())
+    }
+
+    /// A sample, which `draw` draws around a place, and what it means.
+    pub(super) fn sample(
+        &mut self,
+        words: &str,
+        draw: impl FnOnce(&DrawingArea<B, Shift>, (i32, i32)) -> Result<(), String>,
+    ) -> Result<(), String> {
+        draw(self.area, ((LEFT + BAR_WIDTH / 2) * self.scale, self.y * self.scale))?;
+        self.words(LEFT + BAR_WIDTH + 10, self.y, words)?;
+        self.y += PITCH + 3;
+        Ok(())
+    }
+
+    fn words(&self, x: i32, y: i32, words: &str) -> Result<(), String> {
+        let style = letters(LABEL_SIZE, self.scale, INK).pos(Pos::new(HPos::Left, VPos::Center));
+        let text = Text::new(words, (x * self.scale, y * self.scale), style);
+        self.area.draw(&text).map_err(reason)
+    }
+
+    fn fill(&self, from: (i32, i32), to: (i32, i32), colour: Rgb) -> Result<(), String> {
+        self.area.draw(&Rectangle::new([from, to], ink(colour, 0).filled())).map_err(reason)
+    }
+}

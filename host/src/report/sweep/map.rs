@@ -1,0 +1,217 @@
+//! What came of the runs over two variables: a map of coloured fields.
+
+use super::super::axes::{Chart, Frame};
+use super::super::drawing::{self, Drawing, TITLE_HEIGHT, WIDTH};
+use super::super::palette::{FAINT_INK, INK, Rgb, WHITE};
+use super::super::pens::{ink, reason};
+use super::key::{self, Key};
+use super::ramp::Ramp;
+use super::variable::{Along, Variable, widest};
+use super::{Files, Mark};
+use plotters::coord::Shift;
+use plotters::prelude::{DrawingArea, DrawingBackend, PathElement, Rectangle};
+
+/// Held, and not at rest.
+const MOVING: Rgb = [186, 191, 199];
+const LABELS_HEIGHT: i32 = 44;
+/// The chart's height, pixels, and that of a field where there are few.
+const LEAST_HEIGHT: i32 = 300;
+const MOST_HEIGHT: i32 = 620;
+const FIELD_HEIGHT: i32 = 56;
+
+/// A map.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Map {
+    /// Over it.
+    pub title: String,
+    /// From left to right.
+    pub x: Variable,
+    /// From the bottom to the top.
+    pub y: Variable,
+    /// What came of the runs: for each value of `y`, one for each of `x`; none where it is not known.
+    pub marks: Vec<Vec<Option<Mark>>>,
+}
+
+impl Map {
+    /// Draws it.
+    pub fn files(&self) -> Files {
+        [self.png(), self.svg()]
+    }
+
+    fn all(&self) -> impl Iterator<Item = Mark> {
+        self.marks.iter().flatten().filter_map(|mark| *mark)
+    }
+
+    fn height(&self) -> i32 {
+        (FIELD_HEIGHT * self.marks.len() as i32).clamp(LEAST_HEIGHT, MOST_HEIGHT)
+    }
+}
+
+/// Half of the distance between neighbours: fields touch.
+fn half(places: &[f64]) -> f64 {
+    match places {
+        [first, .., last] => 0.5 * (last - first).abs() / (places.len() - 1) as f64,
+        _ => 0.5,
+    }
+}
+
+impl Drawing for Map {
+    fn size(&self) -> (i32, i32) {
+        (WIDTH, TITLE_HEIGHT + self.height() + LABELS_HEIGHT + 12)
+    }
+
+    fn draw<B: DrawingBackend>(&self, root: &DrawingArea<B, Shift>, scale: i32) -> Result<(), String> {
+        let (x, y) = (self.x.places(), self.y.places());
+        let vertical = self.y.ruler(half(&y), Along::Vertical, self.height());
+        let left = 46 + (widest(&vertical) as i32).clamp(24, 140);
+        let frame = Frame { left, right: 10, top: 4, bottom: 4, labels: LABELS_HEIGHT };
+        let horizontal = self.x.ruler(half(&x), Along::Horizontal, WIDTH - key::WIDTH - left - frame.right);
+        drawing::begin(root, &self.title, left, scale)?;
+        let (_, below) = root.split_vertically(TITLE_HEIGHT * scale);
+        let (area, side) = below.split_horizontally((WIDTH - key::WIDTH) * scale);
+        let mut chart = frame.draw(&area, (&horizontal, &vertical), scale)?;
+        let colours = Colours::new(self);
+        for (row, at) in self.marks.iter().zip(&y) {
+            for (mark, across) in row.iter().zip(&x) {
+                if let Some(mark) = mark {
+                    let field = Field { x: *across, y: *at, half: (half(&x), half(&y)) };
+                    field.draw(&mut chart, colours.of(*mark), scale)?;
+                }
+            }
+        }
+        self.border(&mut chart, (&x, &y), scale)?;
+        colours.explain(&side, self, scale)?;
+        root.present().map_err(reason)
+    }
+}
+
+impl Map {
+    /// A line between fields where the grasp is held and fields where it is lost.
+    fn border<B: DrawingBackend>(
+        &self,
+        chart: &mut Chart<'_, B>,
+        (x, y): (&[f64], &[f64]),
+        scale: i32,
+    ) -> Result<(), String> {
+        let held = |column: usize, row: usize| match self.marks.get(row)?.get(column)?.as_ref()? {
+            Mark::Rested(_) | Mark::Moving(_) => Some(true),
+            Mark::Lost(_) => Some(false),
+            Mark::Refused => None,
+        };
+        let differ = |a: Option<bool>, b: Option<bool>| a.zip(b).is_some_and(|(a, b)| a != b);
+        let (dx, dy) = (half(x), half(y));
+        let mut lines = Vec::new();
+        for (row, at) in y.iter().enumerate() {
+            for (column, across) in x.iter().enumerate() {
+                let here = held(column, row);
+                if differ(here, held(column + 1, row)) {
+                    let right = 0.5 * (across + x[column + 1]);
+                    lines.push([(right, at - dy), (right, at + dy)]);
+                }
+                if differ(here, held(column, row + 1)) {
+                    let above = 0.5 * (at + y[row + 1]);
+                    lines.push([(across - dx, above), (across + dx, above)]);
+                }
+            }
+        }
+        let pen = ink(INK, (2 * scale) as u32);
+        chart
+            .draw_series(lines.into_iter().map(|line| PathElement::new(line, pen)))
+            .map(|_| ())
+            .map_err(reason)
+    }
+}
+
+/// How a field is filled.
+enum Fill {
+    Plain(Rgb),
+    Crossed,
+}
+
+struct Field {
+    x: f64,
+    y: f64,
+    half: (f64, f64),
+}
+
+impl Field {
+    fn draw<B: DrawingBackend>(
+        &self,
+        chart: &mut Chart<'_, B>,
+        fill: Fill,
+        scale: i32,
+    ) -> Result<(), String> {
+        let Self { x, y, half: (dx, dy) } = *self;
+        let (low, high) = ((x - dx, y - dy), (x + dx, y + dy));
+        match fill {
+            Fill::Plain(colour) => {
+                let field = Rectangle::new([low, high], ink(colour, 0).filled());
+                chart.draw_series([field]).map(|_| ()).map_err(reason)
+            }
+            Fill::Crossed => {
+                let field = Rectangle::new([low, high], ink(WHITE, 0).filled());
+                chart.draw_series([field]).map_err(reason)?;
+                let pen = ink(FAINT_INK, scale as u32);
+                let lines = [[low, high], [(low.0, high.1), (high.0, low.1)]];
+                chart.draw_series(lines.map(|line| PathElement::new(line, pen))).map(|_| ()).map_err(reason)
+            }
+        }
+    }
+}
+
+/// The colours of a map.
+struct Colours {
+    rested: Option<Ramp>,
+    lost: Option<Ramp>,
+}
+
+impl Colours {
+    fn new(map: &Map) -> Self {
+        let rested = map.all().filter_map(|mark| if let Mark::Rested(t_s) = mark { Some(t_s) } else { None });
+        let lost = map.all().filter_map(|mark| if let Mark::Lost(t_s) = mark { Some(t_s) } else { None });
+        Self { rested: Ramp::rested(rested), lost: Ramp::lost(lost) }
+    }
+
+    fn of(&self, mark: Mark) -> Fill {
+        match (mark, &self.rested, &self.lost) {
+            (Mark::Rested(t_s), Some(ramp), _) | (Mark::Lost(t_s), _, Some(ramp)) => {
+                Fill::Plain(ramp.colour(t_s))
+            }
+            (Mark::Refused, ..) => Fill::Crossed,
+            _ => Fill::Plain(MOVING),
+        }
+    }
+
+    fn explain<B: DrawingBackend>(
+        &self,
+        area: &DrawingArea<B, Shift>,
+        map: &Map,
+        scale: i32,
+    ) -> Result<(), String> {
+        let mut key = Key::new(area, scale);
+        if let Some(ramp) = &self.rested {
+            key.ramp("held, at rest from", ramp)?;
+        }
+        if let Some(ramp) = &self.lost {
+            key.ramp("lost at", ramp)?;
+        }
+        let corners = |(x, y): (i32, i32)| {
+            let half = 8 * scale;
+            [(x - half, y - half), (x + half, y + half)]
+        };
+        if map.all().any(|mark| matches!(mark, Mark::Moving(_))) {
+            key.sample("held, still moving", |area, at| {
+                area.draw(&Rectangle::new(corners(at), ink(MOVING, 0).filled())).map_err(reason)
+            })?;
+        }
+        if map.all().any(|mark| mark == Mark::Refused) {
+            key.sample("refused", |area, at| {
+                let [low, high] = corners(at);
+                let pen = ink(FAINT_INK, scale as u32);
+                area.draw(&PathElement::new([low, high], pen)).map_err(reason)?;
+                area.draw(&PathElement::new([(low.0, high.1), (high.0, low.1)], pen)).map_err(reason)
+            })?;
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,171 @@
+//! The rows of a sweep as a table.
+
+use super::plan::Plan;
+use super::run::{Outcome, Row};
+use crate::record::table::{Cell, Heading, Kind, Layout};
+use crate::sim::summary::{Last, Summary};
+
+/// A column, but for the name and unit of one that is varied.
+type Described = (&'static str, Kind, &'static str, &'static str);
+
+/// What a column says of a run that ran.
+#[rustfmt::skip]
+const OF_SUMMARY: [(Described, fn(&Summary) -> Cell<'_>); 16] = [
+    (("grasp_held", Kind::Truth, "", "whether every fingertip stayed on its face to the end"), |s| Cell::Truth(s.grasp_held)),
+    (("lost_at_s", Kind::Double, "s", "when the grasp was lost"), |s| double(s.lost_at_s)),
+    (("lost_reason", Kind::Words, "", "why the grasp was lost"), |s| words(s.lost_reason.as_ref())),
+    (("fault", Kind::Words, "", "the fault that the controller ended in"), |s| words(s.fault.as_ref())),
+    (("settled", Kind::Truth, "", "whether everything was at rest in the end"), |s| Cell::Truth(s.settled)),
+    (("settle_time_s", Kind::Double, "s", "the time from which on everything was at rest"), |s| double(s.settle_time_s)),
+    (("duration_s", Kind::Double, "s", "simulated time"), |s| Cell::Double(s.duration_s)),
+    (("friction_demand_max", Kind::Double, "", "largest ratio of tangential to normal force"), |s| Cell::Double(s.friction_demand_max)),
+    (("energy_initial_j", Kind::Double, "J", "energy of Eq. 40 at the start"), |s| Cell::Double(s.energy.initial_j)),
+    (("energy_final_j", Kind::Double, "J", "energy of Eq. 40 at the end"), |s| Cell::Double(s.energy.final_j)),
+    (("energy_increase_max_j", Kind::Double, "J", "the most that it ever rose above an earlier value"), |s| Cell::Double(s.energy.increase_max_j)),
+    (("joint_speed_max_rad_s", Kind::Double, "rad/s", "fastest joint at the end"), |s| Cell::Double(s.last.joint_speed_max_rad_s)),
+    (("object_speed_m_s", Kind::Double, "m/s", "speed of the object at the end"), |s| Cell::Double(s.last.object_speed_m_s)),
+    (("object_spin_rad_s", Kind::Double, "rad/s", "angular speed of the object at the end"), |s| Cell::Double(s.last.object_spin_rad_s)),
+    (("force_residual_n", Kind::Double, "N", "largest residual force of Eq. 38 at the end"), |s| Cell::Double(s.last.force_residual_n)),
+    (("moment_residual_nm", Kind::Double, "N m", "largest residual moment of Eq. 38 at the end"), |s| Cell::Double(s.last.moment_residual_nm)),
+];
+
+/// What a column says of a finger at the end.
+#[rustfmt::skip]
+const OF_FINGER: [(Described, fn(&Last) -> &[f64]); 4] = [
+    (("normal_force_n", Kind::Double, "N", "normal force at the end"), |last| &last.normal_force_n),
+    (("desired_normal_force_n", Kind::Double, "N", "the normal force that Eq. 57 asks for at the end"), |last| &last.desired_normal_force_n),
+    (("tangential_force_n", Kind::Double, "N", "tangential force at the end"), |last| &last.tangential_force_n),
+    (("indentation_m", Kind::Double, "m", "indentation at the end"), |last| &last.indentation_m),
+];
+
+/// A column.
+struct Column {
+    name: String,
+    kind: Kind,
+    unit: &'static str,
+    words: &'static str,
+    source: Source,
+}
+
+/// Where a column's values come from.
+#[derive(Clone, Copy)]
+enum Source {
+    Run,
+    Seed,
+    Axis(usize),
+    Refused,
+    Summary(fn(&Summary) -> Cell<'_>),
+    Finger(usize, fn(&Last) -> &[f64]),
+    Configuration,
+}
+
+/// The columns of a sweep's table: the run, what is varied, what came of it, and its effective configuration. A row depends
+/// on its run alone: nothing in it says when or how fast it was run.
+pub(super) struct Columns<'a> {
+    plan: &'a Plan,
+    columns: Vec<Column>,
+}
+
+impl<'a> Columns<'a> {
+    /// For some rows: there are columns for as many fingers as any of them has.
+    pub(super) fn new(plan: &'a Plan, rows: &[Row]) -> Self {
+        let column = |(name, kind, unit, words): Described, source| Column {
+            name: name.to_owned(),
+            kind,
+            unit,
+            words,
+            source,
+        };
+        let mut columns = vec![
+            column(("run", Kind::Whole, "", "number of the run, from 1"), Source::Run),
+            column(("seed", Kind::Whole, "", "seed of the noise"), Source::Seed),
+        ];
+        columns.extend(plan.axes().iter().enumerate().map(|(k, axis)| Column {
+            name: axis.key.clone(),
+            kind: plan.kind(k),
+            unit: axis.unit(),
+            words: "varied",
+            source: Source::Axis(k),
+        }));
+        let refused = ("refused", Kind::Words, "", "why the scene refuses the values; nothing was run then");
+        columns.push(column(refused, Source::Refused));
+        let of_summary = OF_SUMMARY.into_iter();
+        columns.extend(of_summary.map(|(described, value)| column(described, Source::Summary(value))));
+        let fingers =
+            rows.iter().filter_map(Row::summary).map(|summary| summary.last.normal_force_n.len()).max();
+        for finger in 0..fingers.unwrap_or(0) {
+            columns.extend(OF_FINGER.into_iter().map(|((name, kind, unit, words), values)| Column {
+                name: format!("finger_{}.{name}", finger + 1),
+                kind,
+                unit,
+                words,
+                source: Source::Finger(finger, values),
+            }));
+        }
+        let configuration = "effective configuration (TOML): a scene that reproduces this run";
+        columns.push(column(("configuration", Kind::Words, "", configuration), Source::Configuration));
+        // A key that is varied stands for the column of the same name.
+        let is_varied = |column: &Column| plan.axes().iter().any(|axis| axis.key == column.name);
+        columns.retain(|column| matches!(column.source, Source::Axis(_)) || !is_varied(column));
+        Self { plan, columns }
+    }
+}
+
+impl Layout for Columns<'_> {
+    type Row = Row;
+
+    fn row_name(&self) -> &str {
+        "run"
+    }
+
+    fn headings(&self) -> impl Iterator<Item = Heading<'_>> {
+        self.columns.iter().map(|column| Heading {
+            name: &column.name,
+            kind: column.kind,
+            unit: column.unit,
+            words: column.words,
+        })
+    }
+
+    fn cell<'a>(&'a self, row: &'a Row, column: usize) -> Cell<'a> {
+        let Column { kind, source, .. } = &self.columns[column];
+        match (source, &row.outcome) {
+            (Source::Run, _) => Cell::Whole(row.run as i64 + 1),
+            (Source::Axis(k), _) => {
+                let value = &self.plan.axes()[*k].values[self.plan.place(row.run)[*k]];
+                match (kind, value.number) {
+                    (Kind::Whole, Some(number)) => Cell::Whole(number as i64),
+                    (Kind::Double, Some(number)) => Cell::Double(number),
+                    (Kind::Truth, _) => Cell::Truth(value.text == "true"),
+                    _ => Cell::Word(&value.text),
+                }
+            }
+            (Source::Refused, Outcome::Refused(reason)) => Cell::Word(reason),
+            (_, Outcome::Refused(_)) | (Source::Refused, _) => Cell::Missing,
+            (Source::Seed, Outcome::Ran { seed, .. }) => Cell::Whole((*seed).into()),
+            (Source::Summary(value), Outcome::Ran { summary, .. }) => value(summary),
+            (Source::Finger(finger, values), Outcome::Ran { summary, .. }) => {
+                double(values(&summary.last).get(*finger).copied())
+            }
+            (Source::Configuration, Outcome::Ran { .. }) => {
+                let file = self.plan.file(row.run).ok();
+                file.and_then(|file| toml::to_string(&file).ok()).map_or(Cell::Missing, Cell::Text)
+            }
+        }
+    }
+
+    fn about(&self) -> Vec<(String, String)> {
+        vec![
+            ("scene".to_owned(), self.plan.name().to_owned()),
+            ("swept_by".to_owned(), concat!("blindgrasp ", env!("CARGO_PKG_VERSION")).to_owned()),
+        ]
+    }
+}
+
+fn double(value: Option<f64>) -> Cell<'static> {
+    value.map_or(Cell::Missing, Cell::Double)
+}
+
+fn words(value: Option<&String>) -> Cell<'_> {
+    value.map_or(Cell::Missing, |words| Cell::Word(words))
+}
