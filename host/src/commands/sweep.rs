@@ -5,9 +5,8 @@ use anyhow::{Context, bail};
 use blindgrasp::device::interrupt;
 use blindgrasp::record::table::Kind;
 use blindgrasp::scene::{Scene, Setting};
-use blindgrasp::sweep::Outcome as RunOutcome;
 use blindgrasp::sweep::{
-    Axis, Edge, Identity, Journal, Output, Overview, Plan, Row, Swept, Varied, run_refined,
+    self, Axis, Edge, Identity, Journal, Output, Overview, Plan, Row, Swept, Value, Varied,
 };
 use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
@@ -101,7 +100,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
         bar.inc(1);
         journal.keep(row)
     };
-    let swept = run_refined(&mut plan, found.rows, arguments.refine, each, || !interrupt::wanted());
+    let swept = sweep::run_refined(&mut plan, found.rows, arguments.refine, each, || !interrupt::wanted());
     bar.finish_and_clear();
     let Swept { rows, is_whole } =
         swept.context("the sweep is stopped; the same command goes on from where it was")?;
@@ -201,8 +200,11 @@ fn describe(plan: &Plan, rows: &[Row], overview: &Overview, wall_s: f64) -> Stri
     }
     for Edge { held, lost } in &overview.edges {
         let (low, high) = (held.min(*lost), held.max(*lost));
-        let word = |value: f64| if value == *held { "held" } else { "lost" };
-        line("begins to fail", format!("between {low} ({}) and {high} ({})", word(low), word(high)));
+        let end = |value| {
+            let word = if value == *held { "held" } else { "lost" };
+            format!("{} ({word})", Value::number(value).text)
+        };
+        line("begins to fail", format!("between {} and {}", end(low), end(high)));
     }
     if let [varied] = overview.varied.as_slice()
         && rows.len() <= MOST_ROWS
@@ -245,18 +247,15 @@ fn each_row(plan: &Plan, rows: &[Row], varied: &Varied) -> String {
     let mut text = format!("{heading:<width$}  grasp  at rest, s  friction needed\n");
     for (row, (value, _)) in rows {
         let outcome = match &row.outcome {
-            RunOutcome::Refused(reason) => format!("refused: {reason}"),
-            RunOutcome::Ran { summary, .. } => {
-                match (summary.lost_at_s, &summary.lost_reason, &summary.fault) {
-                    (Some(t_s), Some(reason), None) => format!("LOST at {t_s:.3} s: {reason}"),
-                    (Some(t_s), _, Some(fault)) => format!("LOST at {t_s:.3} s: {fault}"),
-                    _ => {
-                        let rest =
-                            summary.settle_time_s.map_or("not yet".to_owned(), |t_s| format!("{t_s:.3}"));
-                        format!("held   {rest:>10}  {:>15.3}", summary.friction_demand_max)
-                    }
+            sweep::Outcome::Refused(reason) => format!("refused: {reason}"),
+            sweep::Outcome::Ran(summary) => match (summary.lost_at_s, &summary.lost_reason, &summary.fault) {
+                (Some(t_s), Some(reason), None) => format!("LOST at {t_s:.3} s: {reason}"),
+                (Some(t_s), _, Some(fault)) => format!("LOST at {t_s:.3} s: {fault}"),
+                _ => {
+                    let rest = summary.settle_time_s.map_or("not yet".to_owned(), |t_s| format!("{t_s:.3}"));
+                    format!("held   {rest:>10}  {:>15.3}", summary.friction_demand_max)
                 }
-            }
+            },
         };
         let _ = writeln!(text, "{value:<width$}  {outcome}");
     }

@@ -169,3 +169,90 @@ fn friction_demand(contact: &ContactSample) -> f64 {
 fn largest(values: impl Iterator<Item = f64>) -> f64 {
     values.fold(0.0, f64::max)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::{Matrix3, UnitQuaternion, Vector3};
+
+    /// Samples that rest now and then, and whose energy goes up and down.
+    fn samples(count: usize, random: &mut fastrand::Rng) -> Vec<Sample> {
+        let mut contact = || ContactSample {
+            normal_force_n: random.f64(),
+            desired_normal_force_n: 1.0,
+            lambda_n: [random.f64(), random.f64() - 0.5],
+            indentation_m: 1e-3,
+            point_m: Vector3::zeros(),
+            frame: Matrix3::identity(),
+            foot_m: [0.0; 2],
+            force_residual_n: Vector3::new(0.1, 0.0, 0.0),
+            moment_residual_nm: Vector3::zeros(),
+        };
+        let contacts: Vec<Vec<ContactSample>> = (0..count).map(|_| vec![contact(), contact()]).collect();
+        let mut sample = |(k, contacts): (usize, Vec<ContactSample>)| Sample {
+            t_s: k as f64 / 1e3,
+            angles_rad: vec![0.0; 3],
+            speeds_rad_s: vec![0.0, if random.u8(..4) == 0 { -2e-3 } else { -9e-4 }, 0.0],
+            estimated_angles_rad: vec![0.0; 3],
+            estimated_speeds_rad_s: vec![0.0; 3],
+            torques_nm: vec![0.0; 3],
+            position_m: Vector3::zeros(),
+            attitude: UnitQuaternion::identity(),
+            velocity_m_s: Vector3::zeros(),
+            spin_rad_s: Vector3::new(0.0, if random.u8(..9) == 0 { 2e-3 } else { 0.0 }, 0.0),
+            contacts,
+            energy_j: random.f64() - 0.5,
+            mode: "grasping",
+        };
+        contacts.into_iter().enumerate().map(&mut sample).collect()
+    }
+
+    fn summary(samples: &[Sample], lost: Option<(f64, Lost)>) -> Summary {
+        let mut tally = Tally::default();
+        samples.iter().for_each(|sample| tally.see(sample));
+        let ending = Ending { scene: "s".into(), duration_s: 1.0, lost, fault: None, wall_s: 0.5 };
+        tally.summary(ending, samples.last())
+    }
+
+    /// Summed up one by one, and as the words of the fields have it.
+    #[test]
+    fn a_summary_is_what_all_samples_say() {
+        let mut random = fastrand::Rng::with_seed(3);
+        let mut settled = 0;
+        for round in 0..300 {
+            let samples = samples(1 + round % 40, &mut random);
+            let summary = summary(&samples, None);
+            let (first, last) = (&samples[0], &samples[samples.len() - 1]);
+            let is_still = |sample: &Sample| sample.speeds_rad_s[1] > -1e-3 && sample.spin_rad_s.y < 1e-3;
+            let from = (0..samples.len()).find(|&k| samples[k..].iter().all(is_still));
+            assert_eq!(summary.settle_time_s, from.map(|k| samples[k].t_s));
+            settled += usize::from(summary.settled);
+            let ratios = samples.iter().flat_map(|sample| &sample.contacts);
+            let ratios = ratios.map(|contact| contact.tangential_force_n() / contact.normal_force_n);
+            assert_eq!(summary.friction_demand_max, ratios.fold(0.0, f64::max));
+            assert_eq!((summary.energy.initial_j, summary.energy.final_j), (first.energy_j, last.energy_j));
+            let rises = (0..samples.len()).flat_map(|late| (0..=late).map(move |early| (early, late)));
+            let rises = rises.map(|(early, late)| samples[late].energy_j - samples[early].energy_j);
+            assert_eq!(summary.energy.increase_max_j, rises.fold(0.0, f64::max));
+            assert_eq!(summary.last.joint_speed_max_rad_s, -last.speeds_rad_s[1]);
+            assert_eq!(summary.last.force_residual_n, 0.1);
+        }
+        assert!((50..250).contains(&settled), "{settled} of 300 settled: not much of a test");
+    }
+
+    #[test]
+    fn what_is_lost_has_not_settled_and_what_never_began_has_no_figures() {
+        let mut random = fastrand::Rng::with_seed(4);
+        let mut still = samples(5, &mut random);
+        for sample in &mut still {
+            sample.speeds_rad_s.fill(0.0);
+            sample.spin_rad_s.fill(0.0);
+        }
+        assert_eq!(summary(&still, None).settle_time_s, Some(0.0));
+        let lost = summary(&still, Some((0.004, Lost::Diverged)));
+        assert!(!lost.settled && !lost.grasp_held && lost.settle_time_s.is_none());
+        assert_eq!(lost.lost_reason.as_deref(), Some("the motion diverged"));
+        let nothing = summary(&[], Some((0.0, Lost::Rank)));
+        assert_eq!((&nothing.last, nothing.energy), (&Last::default(), Energy::default()));
+    }
+}

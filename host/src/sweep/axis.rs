@@ -6,11 +6,14 @@ use thiserror::Error;
 
 /// The most values of a key.
 const MOST_VALUES: usize = 1_000_000;
-/// Digits of the values between the ends of a range.
-const DIGITS: usize = 12;
+/// The most digits of the values between the ends of a range, and the fewest where they are evenly spread in their
+/// logarithms.
+const MOST_DIGITS: usize = 12;
+const FEWEST_DIGITS: usize = 4;
 
-/// A key and its values, in the order in which they are run.
+/// A key and its values, in the order in which they are run; at least one.
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct Axis {
     /// The key, as `--set` takes it.
     pub key: String,
@@ -52,8 +55,8 @@ impl Axis {
     /// Reads `KEY=FROM..TO:N` (N values, evenly from FROM to TO, both included), `KEY=FROM..TO:N:log` (evenly in their
     /// logarithms) or `KEY=A,B,C`, where brackets and quotes keep commas together.
     ///
-    /// The ends of a range are exactly what was written; between them values are rounded to twelve digits, so that they are
-    /// the decimals that one would write.
+    /// The ends of a range are exactly what was written. Between them values are rounded, so that they are the decimals that
+    /// one would write: to twelve digits; in a logarithmic range to so few that it is a thousandth of a step.
     ///
     /// # Errors
     /// What is wrong, and how it is written.
@@ -146,13 +149,17 @@ impl Range {
         if scale == Scale::Logarithmic && !(from > 0.0 && to > 0.0) {
             return Err("a logarithmic range has to be above zero".into());
         }
+        let digits = match scale {
+            Scale::Logarithmic => digits((to / from).ln() / (count - 1) as f64),
+            _ => MOST_DIGITS,
+        };
         let value = |k: usize| {
             let share = k as f64 / (count - 1) as f64;
             match scale {
                 _ if k == 0 => from,
                 _ if k == count - 1 => to,
-                Scale::Logarithmic => rounded(from.powf(1.0 - share) * to.powf(share)),
-                _ => rounded(from * (1.0 - share) + to * share),
+                Scale::Logarithmic => rounded(from.powf(1.0 - share) * to.powf(share), digits),
+                _ => rounded(from * (1.0 - share) + to * share, digits),
             }
         };
         let numbers: Vec<f64> = (0..count).map(value).collect();
@@ -166,9 +173,15 @@ impl Range {
     }
 }
 
+/// How many digits keep rounding below a thousandth of a step in the natural logarithm.
+fn digits(step: f64) -> usize {
+    let needed = 1.0 + (500.0 / step.abs()).log10().ceil();
+    needed.clamp(FEWEST_DIGITS as f64, MOST_DIGITS as f64) as usize
+}
+
 /// The nearest number of so many digits.
-fn rounded(number: f64) -> f64 {
-    format!("{number:.*e}", DIGITS - 1).parse().unwrap_or(number)
+fn rounded(number: f64, digits: usize) -> f64 {
+    format!("{number:.*e}", digits - 1).parse().unwrap_or(number)
 }
 
 /// Splits at commas that are in neither brackets nor quotes.
@@ -213,6 +226,8 @@ mod tests {
         assert_eq!(texts("k.x = 0 .. 1 : 3"), ["0", "0.5", "1"]);
         assert_eq!(texts("k.x=1..-1:3"), ["1", "0", "-1"]);
         assert_eq!(texts("k.x=1e-4..1e-1:4:log"), ["0.0001", "0.001", "0.01", "0.1"]);
+        assert_eq!(texts("k.x=1e-4..1e-3:5:log"), ["0.0001", "0.0001778", "0.0003162", "0.0005623", "0.001"]);
+        assert_eq!(texts("k.x=1..1.1:101:log")[1], "1.000954");
         assert_eq!(texts("k.x=100..1e-6:5:log"), ["100", "1", "0.01", "0.0001", "1e-6"]);
         assert_eq!(texts("k.x=1_000..3_000:3"), ["1000", "2000", "3000"]);
         assert_eq!(Axis::parse("k=1..2:3:log").unwrap().scale, Scale::Logarithmic);
@@ -272,11 +287,12 @@ mod tests {
             prop_assert_eq!((numbers[0], numbers[count - 1]), (from, to));
             for (k, pair) in numbers.windows(2).enumerate() {
                 prop_assert_eq!(pair[0] < pair[1], from < to);
-                // Even steps, up to the twelve digits of both.
+                // Even steps, but for the rounding of both: a thousandth of a step, and the twelve digits.
                 let step = if logarithmic { (to / from).ln() } else { to - from } / (count - 1) as f64;
                 let taken = if logarithmic { (pair[1] / pair[0]).ln() } else { pair[1] - pair[0] };
-                let digits = if logarithmic { 1.0 } else { pair[0].abs().max(pair[1].abs()) };
-                prop_assert!((taken - step).abs() <= 2e-11 * digits, "step {}: {} for {}", k, taken, step);
+                let (share, size) = if logarithmic { (2e-3, 1.0) } else { (0.0, pair[0].abs().max(pair[1].abs())) };
+                let allowed = share * step.abs() + 2e-11 * size;
+                prop_assert!((taken - step).abs() <= allowed, "step {}: {} for {}", k, taken, step);
             }
             for value in &axis.values {
                 // What is set is the number, bit for bit, and a TOML value.

@@ -7,7 +7,7 @@ use crate::record::table::Kind;
 use serde::Serialize;
 use std::collections::BTreeMap;
 
-/// Nearer to each other than this share of the whole range, two values are not told apart, however near to zero they are.
+/// An edge at zero has no relative width: it is bisected down to this share of the whole range.
 const FINEST: f64 = 1e-6;
 
 /// Two neighbouring values, at one of which the grasp is held and at the other lost.
@@ -87,13 +87,13 @@ fn verdicts(plan: &Plan, rows: &[Row]) -> Vec<(f64, bool)> {
 }
 
 /// Values that halve the edges that are too wide.
-fn between(plan: &Plan, rows: &[Row], width: f64) -> Vec<Value> {
+pub(super) fn between(plan: &Plan, rows: &[Row], width: f64) -> Vec<Value> {
     let [axis] = plan.axes() else { return Vec::new() };
     let numbers = || axis.values.iter().filter_map(|value| value.number);
     let span = numbers().fold(f64::NEG_INFINITY, f64::max) - numbers().fold(f64::INFINITY, f64::min);
-    let is_wide = |edge: &Edge| {
-        let Edge { held, lost } = edge;
-        (held - lost).abs() > (width * held.abs().max(lost.abs())).max(FINEST * span)
+    let is_wide = |Edge { held, lost }: &Edge| {
+        let finest = if held * lost > 0.0 { width * held.abs().max(lost.abs()) } else { FINEST * span };
+        (held - lost).abs() > finest
     };
     let whole = plan.kind(0) == Kind::Whole;
     edges(plan, rows)

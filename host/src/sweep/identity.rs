@@ -45,9 +45,9 @@ impl Identity {
         }
         let differs = [
             (self.interface != another.interface, "the interface version"),
-            (self.scene != another.scene, "the scene"),
             (self.settings != another.settings, "what is --set"),
             (self.axes != another.axes, "what is to --vary"),
+            (self.scene != another.scene, "the scene"),
             (self.seeds != another.seeds, "the number of --seeds"),
             (self.refine != another.refine, "--refine"),
         ];

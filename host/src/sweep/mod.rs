@@ -5,7 +5,8 @@
 //! ```
 //!
 //! A [`Plan`] reads the scene's files once and knows the settings of every run; [`run()`] gives a [`Row`] for each. A row
-//! depends on its run alone: not on the order, on the number of cores, or on what was run before.
+//! depends on its run alone: not on the order, on the number of cores, or on what was run before. [`run_refined`] bisects to
+//! where the grasp begins to fail ([`edges`]); [`draw`] makes a picture. Files are [`Output`]'s and the [`Journal`]'s.
 //!
 //! ```no_run
 //! use blindgrasp::sweep::{Axis, Plan, run};
@@ -39,5 +40,6 @@ pub use identity::Identity;
 pub use journal::{Found, Journal, JournalError};
 pub use output::{Output, OutputError};
 pub use overview::{Overview, Varied};
+pub use picture::draw;
 pub use plan::{Plan, PlanError};
 pub use run::{Outcome, Row, run, run_some};

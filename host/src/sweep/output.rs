@@ -88,17 +88,22 @@ impl Output {
     /// which says that what is there is this sweep's.
     ///
     /// # Errors
-    /// A file is there; or what the file system says.
+    /// A file is there, or a directory in its place; or what the file system says.
     pub fn prepare(&self, plan: &Plan, force: bool) -> Result<(), OutputError> {
         if let Some(folder) = self.path.parent() {
             fs::create_dir_all(folder)
                 .map_err(|source| OutputError::Io { path: folder.to_owned(), source })?;
         }
-        if force || self.journal().exists() {
-            return Ok(());
+        let may_overwrite = force || self.journal().exists();
+        for path in [self.path.clone()].into_iter().chain(self.pictures(plan)) {
+            if path.is_dir() {
+                return Err(OutputError::Io { path, source: io::ErrorKind::IsADirectory.into() });
+            }
+            if path.exists() && !may_overwrite {
+                return Err(OutputError::Exists { path });
+            }
         }
-        let mut files = [self.path.clone()].into_iter().chain(self.pictures(plan));
-        files.find(|path| path.exists()).map_or(Ok(()), |path| Err(OutputError::Exists { path }))
+        Ok(())
     }
 
     /// The files of the pictures that a sweep has.

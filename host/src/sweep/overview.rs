@@ -50,7 +50,7 @@ impl Overview {
         let held = ran().filter(|summary| summary.grasp_held).count();
         let reason = |row: &Row| match &row.outcome {
             Outcome::Refused(reason) => Some(reason.clone()),
-            Outcome::Ran { .. } => None,
+            Outcome::Ran(_) => None,
         };
         let varied = plan.axes().iter().map(|axis| Varied {
             key: axis.key.clone(),

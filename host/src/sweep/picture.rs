@@ -13,8 +13,8 @@ pub(super) fn is_drawn(plan: &Plan) -> bool {
     (1..=2).contains(&plan.axes().len())
 }
 
-/// The picture, as a PNG file and as an SVG file.
-pub(super) fn draw(plan: &Plan, rows: &[Row]) -> Option<Files> {
+/// The picture of a sweep, as a PNG file and as an SVG file: over one key a curve, over two a map; none over more.
+pub fn draw(plan: &Plan, rows: &[Row]) -> Option<Files> {
     match plan.axes() {
         [x] => Some(curve(plan, rows, x).files()),
         [x, y] => Some(map(plan, rows, x, y).files()),
@@ -53,7 +53,7 @@ fn map(plan: &Plan, rows: &[Row], x: &Axis, y: &Axis) -> Map {
 fn mark(row: &Row) -> Mark {
     match &row.outcome {
         Outcome::Refused(_) => Mark::Refused,
-        Outcome::Ran { summary, .. } => match (summary.lost_at_s, summary.settle_time_s) {
+        Outcome::Ran(summary) => match (summary.lost_at_s, summary.settle_time_s) {
             (Some(t_s), _) => Mark::Lost(t_s),
             (None, Some(t_s)) => Mark::Rested(t_s),
             (None, None) => Mark::Moving(summary.duration_s),

@@ -10,8 +10,8 @@ const MOST_RUNS: usize = 1_000_000;
 
 /// A sweep: a scene, run once for each combination of the values of its axes, and each of these with so many seeds.
 ///
-/// Runs are numbered from 0: the seed changes fastest, then the last axis, the first one slowest. The files of the scene
-/// are read once, when the plan is made.
+/// Runs are numbered from 0: the seed changes fastest, then the last axis, the first one slowest. Values that bisection adds
+/// to an only axis come behind. The files of the scene are read once, when the plan is made.
 #[derive(Clone, Debug)]
 pub struct Plan {
     scene: String,
@@ -162,12 +162,16 @@ impl Plan {
         self.axes.iter().zip(self.place(run)).map(|(axis, k)| &axis.values[k])
     }
 
+    /// The seed of a run, if it is not varied by its key.
+    pub fn seed(&self, run: usize) -> u32 {
+        self.first().map_or(0, |file| file.seed).wrapping_add(run as u32 % self.seeds)
+    }
+
     /// The settings of a run.
     pub fn settings(&self, run: usize) -> Vec<Setting> {
         let mut settings = self.settings_without_seed(run);
         if self.seeds > 1 {
-            let seed = self.first().map_or(0, |file| file.seed).wrapping_add(run as u32 % self.seeds);
-            settings.push(Setting::varied("seed", &seed.to_string()));
+            settings.push(Setting::varied("seed", &self.seed(run).to_string()));
         }
         settings
     }

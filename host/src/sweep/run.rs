@@ -7,7 +7,7 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::convert::Infallible;
 
-/// What came of a run.
+/// A run, and what came of it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Row {
     /// Number of the run in its plan, from 0.
@@ -21,13 +21,8 @@ pub struct Row {
 pub enum Outcome {
     /// The scene refuses the values, for this reason.
     Refused(String),
-    /// It ran.
-    Ran {
-        /// The seed of its noise.
-        seed: u32,
-        /// The verdict. All but its computing time is the same whenever and wherever it is run.
-        summary: Box<Summary>,
-    },
+    /// It ran. All of its verdict but the computing time is the same whenever and wherever it is run.
+    Ran(Box<Summary>),
 }
 
 impl Row {
@@ -35,7 +30,7 @@ impl Row {
     pub fn summary(&self) -> Option<&Summary> {
         match &self.outcome {
             Outcome::Refused(_) => None,
-            Outcome::Ran { summary, .. } => Some(summary),
+            Outcome::Ran(summary) => Some(summary),
         }
     }
 }
@@ -68,7 +63,7 @@ pub fn run_some<E: Send>(
             None => Ok(None),
         }
     };
-    // One at a time, in order: lengths differ, and so nobody waits long for the last.
+    // One at a time, since their lengths differ: so no core waits long for the last.
     let rows: Vec<Option<Row>> = runs.par_iter().with_max_len(1).map(one).collect::<Result<_, _>>()?;
     Ok(rows.into_iter().flatten().collect())
 }
@@ -88,5 +83,5 @@ fn outcome(plan: &Plan, run: usize, goes_on: impl Fn() -> bool) -> Option<Outcom
         is_whole = goes_on();
         is_whole
     });
-    is_whole.then(|| Outcome::Ran { seed: scene.seed, summary: Box::new(summary) })
+    is_whole.then(|| Outcome::Ran(Box::new(summary)))
 }

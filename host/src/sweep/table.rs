@@ -131,6 +131,7 @@ impl Layout for Columns<'_> {
         let Column { kind, source, .. } = &self.columns[column];
         match (source, &row.outcome) {
             (Source::Run, _) => Cell::Whole(row.run as i64 + 1),
+            (Source::Seed, _) => Cell::Whole(self.plan.seed(row.run).into()),
             (Source::Axis(k), _) => {
                 let value = &self.plan.axes()[*k].values[self.plan.place(row.run)[*k]];
                 match (kind, value.number) {
@@ -142,12 +143,11 @@ impl Layout for Columns<'_> {
             }
             (Source::Refused, Outcome::Refused(reason)) => Cell::Word(reason),
             (_, Outcome::Refused(_)) | (Source::Refused, _) => Cell::Missing,
-            (Source::Seed, Outcome::Ran { seed, .. }) => Cell::Whole((*seed).into()),
-            (Source::Summary(value), Outcome::Ran { summary, .. }) => value(summary),
-            (Source::Finger(finger, values), Outcome::Ran { summary, .. }) => {
+            (Source::Summary(value), Outcome::Ran(summary)) => value(summary),
+            (Source::Finger(finger, values), Outcome::Ran(summary)) => {
                 double(values(&summary.last).get(*finger).copied())
             }
-            (Source::Configuration, Outcome::Ran { .. }) => {
+            (Source::Configuration, Outcome::Ran(_)) => {
                 let file = self.plan.file(row.run).ok();
                 file.and_then(|file| toml::to_string(&file).ok()).map_or(Cell::Missing, Cell::Text)
             }

@@ -12,7 +12,16 @@ pub(super) const WIDTH: i32 = 182;
 const LEFT: i32 = 10;
 const BAR_WIDTH: i32 = 18;
 const BAR_HEIGHT: i32 = 112;
-const PITCH: i32 = 19;
+/// Above the first line, between a heading and its bar, below a bar, and from a sample to the next.
+const TOP: i32 = 14;
+const ABOVE_BAR: i32 = 18;
+const BELOW_BAR: i32 = 28;
+const PITCH: i32 = 22;
+
+/// Pixels that a key takes.
+pub(super) fn height(ramps: usize, samples: usize) -> i32 {
+    TOP + ramps as i32 * (ABOVE_BAR + BAR_HEIGHT + BELOW_BAR) + samples as i32 * PITCH
+}
 
 /// A key that is being drawn, from the top down.
 pub(super) struct Key<'a, B: DrawingBackend> {
@@ -23,13 +32,13 @@ pub(super) struct Key<'a, B: DrawingBackend> {
 
 impl<'a, B: DrawingBackend> Key<'a, B> {
     pub(super) fn new(area: &'a DrawingArea<B, Shift>, scale: i32) -> Self {
-        Self { area, scale, y: 14 }
+        Self { area, scale, y: TOP }
     }
 
     /// A heading and a bar of colours with its numbers, seconds.
     pub(super) fn ramp(&mut self, heading: &str, ramp: &Ramp) -> Result<(), String> {
         self.words(LEFT, self.y, heading)?;
-        let top = self.y + 18;
+        let top = self.y + ABOVE_BAR;
         let (scale, height) = (self.scale, BAR_HEIGHT * self.scale);
         let value = |share: f64| ramp.range.start + (ramp.range.end - ramp.range.start) * share;
         for row in 0..height {
@@ -46,7 +55,7 @@ impl<'a, B: DrawingBackend> Key<'a, B> {
             self.area.draw(&PathElement::new(line, ink(FAINT_INK, scale as u32))).map_err(reason)?;
             self.words(right + 10, y, &format!("{} s", series::label(tick, &ticks)))?;
         }
-        self.y = top + BAR_HEIGHT + 28;
+        self.y = top + BAR_HEIGHT + BELOW_BAR;
         Ok(())
     }
 
@@ -58,7 +67,7 @@ impl<'a, B: DrawingBackend> Key<'a, B> {
     ) -> Result<(), String> {
         draw(self.area, ((LEFT + BAR_WIDTH / 2) * self.scale, self.y * self.scale))?;
         self.words(LEFT + BAR_WIDTH + 10, self.y, words)?;
-        self.y += PITCH + 3;
+        self.y += PITCH;
         Ok(())
     }
 

@@ -42,8 +42,21 @@ impl Map {
         self.marks.iter().flatten().filter_map(|mark| *mark)
     }
 
+    fn has(&self, is: impl Fn(&Mark) -> bool) -> bool {
+        self.all().any(|mark| is(&mark))
+    }
+
+    /// Of the chart: so many pixels that its key has place beside it.
     fn height(&self) -> i32 {
-        (FIELD_HEIGHT * self.marks.len() as i32).clamp(LEAST_HEIGHT, MOST_HEIGHT)
+        let count = |kinds: [bool; 2]| kinds.into_iter().filter(|is_there| *is_there).count();
+        let ramps = [
+            self.has(|mark| matches!(mark, Mark::Rested(_))),
+            self.has(|mark| matches!(mark, Mark::Lost(_))),
+        ];
+        let samples =
+            [self.has(|mark| matches!(mark, Mark::Moving(_))), self.has(|mark| *mark == Mark::Refused)];
+        let key = key::height(count(ramps), count(samples)) - LABELS_HEIGHT;
+        (FIELD_HEIGHT * self.marks.len() as i32).clamp(LEAST_HEIGHT.max(key), MOST_HEIGHT)
     }
 }
 
@@ -199,12 +212,12 @@ impl Colours {
             let half = 8 * scale;
             [(x - half, y - half), (x + half, y + half)]
         };
-        if map.all().any(|mark| matches!(mark, Mark::Moving(_))) {
+        if map.has(|mark| matches!(mark, Mark::Moving(_))) {
             key.sample("held, still moving", |area, at| {
                 area.draw(&Rectangle::new(corners(at), ink(MOVING, 0).filled())).map_err(reason)
             })?;
         }
-        if map.all().any(|mark| mark == Mark::Refused) {
+        if map.has(|mark| *mark == Mark::Refused) {
             key.sample("refused", |area, at| {
                 let [low, high] = corners(at);
                 let pen = ink(FAINT_INK, scale as u32);

@@ -4,6 +4,8 @@ mod curve;
 mod key;
 mod map;
 mod ramp;
+#[cfg(test)]
+mod tests;
 mod variable;
 
 pub use curve::{Curve, Dot};

@@ -3,7 +3,10 @@
 use super::*;
 use crate::scene::{Scene, Setting};
 
+mod edges;
+mod journal;
 mod rows;
+mod table;
 
 fn plan(scene: &str, settings: &[&str], axes: &[&str], seeds: u32) -> Result<Plan, String> {
     let settings = settings.iter().map(|text| Setting::parse(text).unwrap()).collect();
@@ -103,4 +106,27 @@ fn a_value_that_a_scene_refuses_is_no_error() {
     for axis in ["control.force_n=much,5", "control.force_n=5,-1", "object=ball,cube"] {
         assert!(plan("cube", &[], &[axis], 1).is_ok(), "{axis}");
     }
+}
+
+/// A sweep is of one scene: what happens to its files while it runs changes nothing.
+#[test]
+fn the_files_of_a_scene_are_read_once() {
+    let folder = tempfile::tempdir().unwrap();
+    let write = |name: &str, text: &str| std::fs::write(folder.path().join(name), text).unwrap();
+    write(
+        "scene.toml",
+        &include_str!("../../../../models/scenes/cube.toml").replace("\"cube\"", "\"cube.toml\""),
+    );
+    write("cube.toml", include_str!("../../../../models/objects/cube.toml"));
+    let scene = folder.path().join("scene.toml");
+    let prism = folder.path().join("prism.toml");
+    write("prism.toml", include_str!("../../../../models/objects/prism.toml"));
+    let axis = format!("object=cube,{}", prism.display());
+    let plan = plan(scene.to_str().unwrap(), &["name=s"], &["friction.scale=0,1", &axis], 1).unwrap();
+    let all = || (0..4).map(|run| (plan.file(run), plan.scene(run))).collect::<Vec<_>>();
+    let before = all();
+    drop(folder);
+    assert_eq!(all(), before);
+    let names = before.iter().map(|(file, _)| file.as_ref().map_or("", |file| &file.object.name));
+    assert_eq!(names.collect::<Vec<_>>(), ["cube", "prism", "cube", "prism"]);
 }
