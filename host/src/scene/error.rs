@@ -69,20 +69,24 @@ impl SceneError {
         if !self.remedy.is_empty() {
             line = line + "; " + &self.remedy;
         }
-        // Keys and names come from files and may contain anything, at any length.
-        let mut clean = String::new();
-        for c in line.chars() {
-            if clean.len() > LONGEST_LINE {
-                return clean + " ...";
-            }
-            if c.is_control() {
-                clean.extend(c.escape_debug());
-            } else {
-                clean.push(c);
-            }
-        }
-        clean
+        one_line(&line)
     }
+}
+
+/// A text without control characters, cut where it is too long: keys and names come from files and may contain anything.
+pub(crate) fn one_line(text: &str) -> String {
+    let mut clean = String::new();
+    for c in text.chars() {
+        if clean.len() > LONGEST_LINE {
+            return clean + " ...";
+        }
+        if c.is_control() {
+            clean.extend(c.escape_debug());
+        } else {
+            clean.push(c);
+        }
+    }
+    clean
 }
 
 /// `did you mean ...`, or everything there is.

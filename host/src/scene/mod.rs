@@ -38,6 +38,7 @@ use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 use std::path::Path;
 use tree::{Node, Setting};
 
+pub(crate) use error::one_line;
 pub use error::{Place, SceneError, suggestion};
 pub use file::{Actuators, Control, Friction, HandFile, ObjectFile, PlantSettings, SceneFile, Sensors};
 pub use hand_model::HandModel;
