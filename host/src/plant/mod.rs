@@ -11,6 +11,7 @@ pub mod integrator;
 mod linear;
 pub mod model;
 pub mod polyhedron;
+mod surroundings;
 
 pub use integrator::Plant;
 pub use model::{ContactForce, Lost, ModelError, Motion, ObjectModel, PlantModel};

@@ -16,6 +16,7 @@ pub mod file;
 mod hand;
 mod hand_model;
 mod library;
+pub mod mesh;
 mod object;
 pub mod placement;
 mod read;
@@ -33,10 +34,10 @@ use blindgrasp_shared::control::GraspConfig;
 use blindgrasp_shared::math::Real;
 use blindgrasp_shared::tick::Config;
 use controller::Setup;
-use library::{Document, Kind};
+use library::{Complete, Document, Kind};
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 use std::path::Path;
-use tree::{Node, Setting};
+use tree::Setting;
 
 pub(crate) use error::one_line;
 pub use error::{Place, SceneError, suggestion};
@@ -147,12 +148,14 @@ impl Scene {
 
     fn from_document(document: Document, settings: &[String]) -> Result<Self, SceneError> {
         let settings = settings.iter().map(|text| Setting::parse(text)).collect::<Result<Vec<_>, _>>()?;
-        let tree = document.complete_scene(&settings)?;
+        let Complete { node: tree, notices } = document.complete_scene(&settings)?;
         let file = read::read(&tree, "")?;
-        build::scene(file).map_err(|error| {
+        let mut scene = build::scene(file).map_err(|error| {
             let place = tree.place_of(&error.key).clone();
             error.at(&place)
-        })
+        })?;
+        scene.warnings.splice(0..0, notices);
+        Ok(scene)
     }
 
     /// Checks and prepares a scene that was put together in code.
@@ -201,7 +204,7 @@ impl HandFile {
     /// # Errors
     /// What is wrong with the file as a file; a [`Scene`] checks the numbers.
     pub fn load(name_or_path: &str) -> Result<Self, SceneError> {
-        let mut node = open(Kind::Hand, name_or_path)?;
+        let mut node = open(Kind::Hand, name_or_path)?.node;
         library::complete_hand(&mut node);
         read::read(&node, "")
     }
@@ -213,12 +216,19 @@ impl ObjectFile {
     /// # Errors
     /// What is wrong with the file as a file; a [`Scene`] checks the numbers.
     pub fn load(name_or_path: &str) -> Result<Self, SceneError> {
-        read::read(&open(Kind::Object, name_or_path)?, "")
+        Self::load_noticing(name_or_path).map(|(file, _)| file)
+    }
+
+    /// Loads an object by its built-in name or by its path; and says what its mesh had to be repaired of.
+    ///
+    /// # Errors
+    /// What is wrong with the file as a file; a [`Scene`] checks the numbers.
+    pub fn load_noticing(name_or_path: &str) -> Result<(Self, Vec<String>), SceneError> {
+        let Complete { node, notices } = open(Kind::Object, name_or_path)?.complete_object()?;
+        Ok((read::read(&node, "")?, notices))
     }
 }
 
-fn open(kind: Kind, name_or_path: &str) -> Result<Node, SceneError> {
-    Document::open(kind, name_or_path, Path::new(""))
-        .map(|document| document.node)
-        .map_err(|error| error.at(&Place::whole(name_or_path)))
+fn open(kind: Kind, name_or_path: &str) -> Result<Document, SceneError> {
+    Document::open(kind, name_or_path, Path::new("")).map_err(|error| error.at(&Place::whole(name_or_path)))
 }

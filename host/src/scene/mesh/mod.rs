@@ -1,0 +1,144 @@
+//! Bodies from mesh files: `[shape.mesh]` of an object with `file`, `unit` and `scale` becomes one with vertices and
+//! triangles in metres, so that everything behind it, also a recording or a scene that was written, needs no file.
+//!
+//! ```text
+//! file (.stl, .obj) -> triangles, each for itself -> metres -> vertices welded -> repaired -> vertices, triangles -> faces
+//! ```
+//!
+//! The last step is [`Polyhedron::mesh`](crate::plant::polyhedron::Polyhedron::mesh); it is the same for triangles that
+//! stand in the file of an object. What is repaired, and what is not:
+//!
+//! | what | how |
+//! |---|---|
+//! | vertices within 1e-6 of the body's diagonal of another | welded; a notice, if they were not the same to the bit |
+//! | triangles without area, or there twice | left out; a notice |
+//! | triangles turned against their neighbours, or a body inside out | turned over; a notice |
+//! | cracks: open edges whose vertices are within 1e-4 of the diagonal | welded; a notice |
+//! | open edges with a neighbour's vertex in their middle | cut there; a notice |
+//! | slivers | kept: they take the face beside them |
+//! | other open edges; edges of three triangles; several parts; one-sided surfaces; no volume | refused, with the place |
+//! | a surface that cuts through itself | read; `object check` finds it |
+//!
+//! Tolerances are lengths in comparison with the diagonal of the box around the body; nothing else hangs on exact
+//! arithmetic: that a surface is closed and which way it is turned follows from the numbers of its vertices alone. Everything
+//! is bounded before room is made for it (`limits`), and takes `n log n` steps.
+
+mod cracks;
+mod limits;
+mod obj;
+mod polygon;
+mod repair;
+mod soup;
+mod stl;
+#[cfg(test)]
+mod tests;
+mod unit;
+mod weld;
+
+use super::check::{Result, within};
+use super::error::{Place, SceneError, suggestion};
+use super::library::Folder;
+use super::tree::{Entry, Node, Value};
+use repair::repair;
+use soup::{Problem, Soup};
+use std::path::Path;
+pub use unit::Unit;
+
+/// What a mesh file may be scaled by.
+const SCALES: [f64; 2] = [1e-6, 1e6];
+
+/// Puts vertices and triangles in the place of the mesh file that an object (of the given key; empty for the object's own
+/// file) names, if it does. What was repaired is said in words.
+pub(super) fn expand(object: &mut Node, key: &str, folder: &Folder) -> Result<Vec<String>> {
+    let Some(mesh) = object.get_mut("shape").and_then(|shape| shape.get_mut("mesh")) else {
+        return Ok(Vec::new());
+    };
+    let key = if key.is_empty() { "shape.mesh".to_owned() } else { format!("{key}.shape.mesh") };
+    let Some(entry) = take(mesh, "file") else { return Ok(Vec::new()) };
+    let place = entry.place;
+    let fail = |name: &str, problem: String, remedy: String, place: &Place| {
+        Err(SceneError::new(format!("{key}.{name}"), problem, remedy).at(place))
+    };
+    let Value::String(file) = &entry.node.value else {
+        return fail("file", "is no name".into(), "write file = \"part.stl\"".into(), &place);
+    };
+    for given in ["vertices_m", "triangles"] {
+        if mesh.get_mut(given).is_some() {
+            return fail(given, "is given beside a file".into(), "leave one out".into(), &place);
+        }
+    }
+    let scale = match take(mesh, "scale") {
+        None => 1.0,
+        Some(entry) => {
+            let value = match entry.node.value {
+                Value::Float(value) => value,
+                Value::Integer(value) => value as f64,
+                _ => return fail("scale", "is no number".into(), "write scale = 1.0".into(), &entry.place),
+            };
+            within(&format!("{key}.scale"), value, SCALES[0], SCALES[1])
+                .map_err(|error| error.at(&entry.place))?;
+            value
+        }
+    };
+    let unit = take(mesh, "unit");
+    let on_command_line = *entry.node.place.source == *"--set";
+    let folder = if on_command_line { &Folder::Disk(Path::new("").into()) } else { folder };
+    let of_file = |problem: Problem| {
+        SceneError::new(format!("{key}.file"), format!("`{file}`: {}", problem.what), problem.remedy)
+            .at(&place)
+    };
+    let bytes = folder
+        .bytes(file, limits::LARGEST_FILE)
+        .map_err(|error| of_file(Problem::new(error.problem, error.remedy)))?;
+    let soup = parse(file, bytes).map_err(of_file)?;
+    let unit = match unit.as_ref().map(|entry| (&entry.node.value, &entry.place)) {
+        Some((Value::String(word), place)) => match Unit::of(word) {
+            Some(unit) => unit,
+            None => {
+                let remedy = suggestion(word, Unit::ALL.map(Unit::word));
+                return fail("unit", format!("`{word}` is unknown"), remedy, place);
+            }
+        },
+        Some((_, place)) => return fail("unit", "is no name".into(), "write unit = \"mm\"".into(), place),
+        None => return fail("unit", "is missing".into(), Unit::choices(&soup.size()), &place),
+    };
+    let mesh_of = body(soup, unit, scale).map_err(of_file)?;
+    let Value::Table(entries) = &mut mesh.value else { return Ok(Vec::new()) };
+    let node = |value| Node { value, place: place.clone() };
+    let list = |items: Vec<Value>| node(Value::Array(items.into_iter().map(node).collect()));
+    let vertices =
+        mesh_of.vertices.iter().map(|p| list(p.iter().map(|v| Value::Float(*v)).collect())).collect();
+    let triangles = mesh_of
+        .triangles
+        .iter()
+        .map(|corners| list(corners.iter().map(|k| Value::Integer(*k as i64)).collect()))
+        .collect();
+    for (name, items) in [("vertices_m", vertices), ("triangles", triangles)] {
+        let node = node(Value::Array(items));
+        entries.push(Entry { key: name.into(), place: place.clone(), node });
+    }
+    let name = Path::new(file).file_name().map_or(file.clone(), |name| name.to_string_lossy().into_owned());
+    Ok(mesh_of.notices.into_iter().map(|notice| format!("`{name}`: {notice}")).collect())
+}
+
+/// Takes an entry out of a table.
+fn take(table: &mut Node, key: &str) -> Option<Entry> {
+    let Value::Table(entries) = &mut table.value else { return None };
+    let index = entries.iter().position(|entry| entry.key == key)?;
+    Some(entries.remove(index))
+}
+
+/// Reads a file by its name's ending.
+fn parse(name: &str, bytes: Vec<u8>) -> std::result::Result<Soup, Problem> {
+    match Path::new(name).extension().map(|ending| ending.to_ascii_lowercase()) {
+        Some(ending) if ending == "stl" => stl::read(bytes),
+        Some(ending) if ending == "obj" => obj::read(bytes),
+        _ => Err(Problem::new("is neither .stl nor .obj", "export it as STL or OBJ")),
+    }
+}
+
+/// From what the file says to a closed surface in metres.
+fn body(mut soup: Soup, unit: Unit, scale: f64) -> std::result::Result<repair::Repaired, Problem> {
+    soup.scale(|length| unit.metres(length * scale));
+    repair(soup).map_err(|fault| Problem::new(fault.to_string(), fault.remedy()))
+}
