@@ -19,7 +19,7 @@ pub(super) struct Body {
 }
 
 /// The polyhedron of a shape.
-fn polyhedron(shape: &ShapeFile) -> std::result::Result<Polyhedron, PolyhedronError> {
+pub(super) fn polyhedron(shape: &ShapeFile) -> std::result::Result<Polyhedron, PolyhedronError> {
     match shape {
         ShapeFile::Box { size_m } => Polyhedron::cuboid(*size_m),
         ShapeFile::Prism { sides, side_m, height_m } => {

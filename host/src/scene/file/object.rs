@@ -73,7 +73,7 @@ pub enum ShapeFile {
     /// faces are numbered in the order of their first triangles.
     ///
     /// In a file `file`, `unit` and `scale` may stand for vertices and triangles: an STL or OBJ file beside it, read
-    /// and repaired as [`super::mesh`] says.
+    /// and repaired as [`crate::scene::mesh`] says.
     Mesh {
         /// The vertices, m.
         vertices_m: Vec<[f64; 3]>,
@@ -90,6 +90,11 @@ pub enum ShapeFile {
 }
 
 impl ShapeFile {
+    /// A mesh with the usual tolerances.
+    pub fn mesh(vertices_m: Vec<[f64; 3]>, triangles: Vec<[usize; 3]>) -> Self {
+        Self::Mesh { vertices_m, triangles, flat_deg: Self::flat_deg(), flat_m: None }
+    }
+
     fn flat_deg() -> f64 {
         2.0
     }

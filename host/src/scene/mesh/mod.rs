@@ -37,11 +37,13 @@ mod weld;
 
 use super::check::{Result, within};
 use super::error::{Place, SceneError, suggestion};
+use super::file::ShapeFile;
 use super::library::Folder;
 use super::tree::{Entry, Node, Value};
-use repair::repair;
+use repair::{Repaired, repair};
 use soup::{Problem, Soup};
-use std::path::Path;
+use std::path::{Path, PathBuf};
+
 pub use unit::Unit;
 
 /// What a mesh file may be scaled by.
@@ -82,15 +84,12 @@ pub(super) fn expand(object: &mut Node, key: &str, folder: &Folder) -> Result<Ve
     };
     let unit = take(mesh, "unit");
     let on_command_line = *entry.node.place.source == *"--set";
-    let folder = if on_command_line { &Folder::Disk(Path::new("").into()) } else { folder };
+    let folder = if on_command_line { &Folder::Disk(PathBuf::new()) } else { folder };
     let of_file = |problem: Problem| {
         SceneError::new(format!("{key}.file"), format!("`{file}`: {}", problem.what), problem.remedy)
             .at(&place)
     };
-    let bytes = folder
-        .bytes(file, limits::LARGEST_FILE)
-        .map_err(|error| of_file(Problem::new(error.problem, error.remedy)))?;
-    let soup = parse(file, bytes).map_err(of_file)?;
+    let soup = parse(file, folder).map_err(of_file)?;
     let unit = match unit.as_ref().map(|entry| (&entry.node.value, &entry.place)) {
         Some((Value::String(word), place)) => match Unit::of(word) {
             Some(unit) => unit,
@@ -100,7 +99,10 @@ pub(super) fn expand(object: &mut Node, key: &str, folder: &Folder) -> Result<Ve
             }
         },
         Some((_, place)) => return fail("unit", "is no name".into(), "write unit = \"mm\"".into(), place),
-        None => return fail("unit", "is missing".into(), Unit::choices(&soup.size()), &place),
+        None => {
+            let remedy = Unit::choices(&soup.size(), |word| format!("unit = \"{word}\""));
+            return fail("unit", "is missing".into(), remedy, &place);
+        }
     };
     let mesh_of = body(soup, unit, scale).map_err(of_file)?;
     let Value::Table(entries) = &mut mesh.value else { return Ok(Vec::new()) };
@@ -128,17 +130,44 @@ fn take(table: &mut Node, key: &str) -> Option<Entry> {
     Some(entries.remove(index))
 }
 
+/// Reads a mesh file alone, for an object whose file is still to be written; and says what had to be repaired.
+///
+/// # Errors
+/// One line: which file, what is wrong, what to do.
+pub fn load(path: &str, unit: Option<Unit>) -> Result<(ShapeFile, Vec<String>)> {
+    let of_file =
+        |problem: Problem| SceneError::new("", problem.what, problem.remedy).at(&Place::whole(path));
+    let soup = parse(path, &Folder::Disk(PathBuf::new())).map_err(of_file)?;
+    let Some(unit) = unit else {
+        let remedy = Unit::choices(&soup.size(), |word| format!("--unit {word}"));
+        return Err(of_file(Problem::new("a mesh file does not say its unit", remedy)));
+    };
+    let Repaired { vertices, triangles, notices } = body(soup, unit, 1.0).map_err(of_file)?;
+    Ok((ShapeFile::mesh(vertices.into_iter().map(Into::into).collect(), triangles), notices))
+}
+
+/// Whether a name is that of a mesh file.
+pub fn is_mesh(name: &str) -> bool {
+    ending(name).is_some_and(|ending| ending == "stl" || ending == "obj")
+}
+
+fn ending(name: &str) -> Option<String> {
+    Path::new(name).extension().map(|ending| ending.to_string_lossy().to_ascii_lowercase())
+}
+
 /// Reads a file by its name's ending.
-fn parse(name: &str, bytes: Vec<u8>) -> std::result::Result<Soup, Problem> {
-    match Path::new(name).extension().map(|ending| ending.to_ascii_lowercase()) {
-        Some(ending) if ending == "stl" => stl::read(bytes),
-        Some(ending) if ending == "obj" => obj::read(bytes),
-        _ => Err(Problem::new("is neither .stl nor .obj", "export it as STL or OBJ")),
-    }
+fn parse(name: &str, folder: &Folder) -> std::result::Result<Soup, Problem> {
+    let read = match ending(name).as_deref() {
+        Some("stl") => stl::read,
+        Some("obj") => obj::read,
+        _ => return Err(Problem::new("is neither .stl nor .obj", "export it as STL or OBJ")),
+    };
+    let bytes = folder.bytes(name, limits::LARGEST_FILE);
+    read(bytes.map_err(|error| Problem::new(error.problem, error.remedy))?)
 }
 
 /// From what the file says to a closed surface in metres.
-fn body(mut soup: Soup, unit: Unit, scale: f64) -> std::result::Result<repair::Repaired, Problem> {
+fn body(mut soup: Soup, unit: Unit, scale: f64) -> std::result::Result<Repaired, Problem> {
     soup.scale(|length| unit.metres(length * scale));
     repair(soup).map_err(|fault| Problem::new(fault.to_string(), fault.remedy()))
 }

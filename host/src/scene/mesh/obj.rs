@@ -97,6 +97,19 @@ fn kind(line: &[u8]) -> Option<u8> {
     }
 }
 
+/// A vertex without its colour: where only some have one, the library counts colours and vertices as one.
+fn without_colour(line: &[u8]) -> &[u8] {
+    let is_start =
+        |k: &usize| !line[*k].is_ascii_whitespace() && (*k == 0 || line[k - 1].is_ascii_whitespace());
+    let mut words = (0..line.len()).filter(is_start);
+    // The keyword, three coordinates, three shares.
+    let colour = words.nth(4);
+    match (colour, words.nth(1)) {
+        (Some(colour), Some(_)) => &line[..colour],
+        _ => line,
+    }
+}
+
 /// Before anything is kept: there may be billions.
 fn check_counts(bytes: &[u8]) -> Result<(), Problem> {
     let fail = |what: String| {
@@ -182,8 +195,8 @@ impl BufRead for Lines<'_> {
             let line = &self.rest[..end];
             self.rest = self.rest.get(end + 1..).unwrap_or_default();
             self.line += 1;
-            if kind(line).is_some() {
-                self.buffer = line.to_vec();
+            if let Some(kind) = kind(line) {
+                self.buffer = if kind == b'v' { without_colour(line) } else { line }.to_vec();
                 self.buffer.push(b'\n');
                 self.at = 0;
             }

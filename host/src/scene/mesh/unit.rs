@@ -45,10 +45,10 @@ impl Unit {
     }
 
     /// How large something is in each unit, for whoever has to choose one.
-    pub(super) fn choices(size: &Vector3<f64>) -> String {
+    pub(super) fn choices(size: &Vector3<f64>, how: impl Fn(&str) -> String) -> String {
         let choices = Self::ALL.map(|unit| {
             let [x, y, z] = [size.x, size.y, size.z].map(|length| short(unit.metres(length) * 1e3));
-            format!("unit = \"{}\" if it measures {x} x {y} x {z} mm", unit.word())
+            format!("{} if it measures {x} x {y} x {z} mm", how(unit.word()))
         });
         format!("add {}", choices.join(", "))
     }

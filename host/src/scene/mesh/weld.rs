@@ -3,31 +3,43 @@
 use nalgebra::Vector3;
 use std::collections::HashMap;
 
-/// For each point the first of those that stand for all others: one within the tolerance of it (per coordinate), itself if there is
-/// none. Points that stand for others are farther apart than the tolerance.
+/// The side of a cube, in tolerances. In a larger one more points may stand for others; of a smaller one more points are near
+/// a side, so that the cube on the other side has to be looked at as well.
+const SIDE: f64 = 8.0;
+/// The end of a list.
+const END: u32 = u32::MAX;
+
+/// For each point the first of those that stand for all others: one within the tolerance of it (in each coordinate), itself
+/// if there is none. Points that stand for others are farther apart than the tolerance.
 ///
-/// Points are sorted into cubes of twice the tolerance; what is near a point lies in eight of them at most, and in each of
-/// these there are eight at most that stand for others. So it takes `n` steps, wherever the points are.
+/// Points are sorted into cubes. What is near a point lies in eight of them at most, and in each of these there are 125 at
+/// most that stand for others. So it takes `n` steps, wherever the points are.
 pub(super) fn weld(points: &[Vector3<f64>], tolerance: f64) -> Vec<u32> {
-    let mut cubes: HashMap<[i64; 3], Vec<u32>> = HashMap::with_capacity(points.len());
-    let near = |a: u32, b: u32| (points[a as usize] - points[b as usize]).amax() <= tolerance;
-    let side = 2.0 * tolerance;
+    // The last that was put into each cube, and for each point the one before it.
+    let mut last: HashMap<[i64; 3], u32> = HashMap::with_capacity(points.len());
+    let mut before = vec![END; points.len()];
+    let side = SIDE * tolerance;
     (0..points.len() as u32)
         .map(|own| {
-            let place = points[own as usize] / side;
-            let home = place.map(f64::floor);
-            // The cubes on the sides of its own to which it is nearer.
-            let step = (place - home).map(|share| if share < 0.5 { -1.0 } else { 1.0 });
-            let found = (0..8).find_map(|bits| {
-                let at =
-                    Vector3::from_fn(|k, _| if bits & (1 << k) == 0 { home[k] } else { home[k] + step[k] });
-                let cube = cubes.get(&[at.x as i64, at.y as i64, at.z as i64])?;
-                cube.iter().copied().find(|&other| near(own, other))
-            });
-            found.unwrap_or_else(|| {
-                cubes.entry([home.x as i64, home.y as i64, home.z as i64]).or_default().push(own);
-                own
-            })
+            let point = points[own as usize];
+            let cube = |place: f64| (place / side).floor() as i64;
+            let range = |k: usize| cube(point[k] - tolerance)..=cube(point[k] + tolerance);
+            for x in range(0) {
+                for y in range(1) {
+                    for z in range(2) {
+                        let mut other = last.get(&[x, y, z]).copied().unwrap_or(END);
+                        while other != END {
+                            if (points[other as usize] - point).amax() <= tolerance {
+                                return other;
+                            }
+                            other = before[other as usize];
+                        }
+                    }
+                }
+            }
+            let home = [point.x, point.y, point.z].map(cube);
+            before[own as usize] = last.insert(home, own).unwrap_or(END);
+            own
         })
         .collect()
 }
