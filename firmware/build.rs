@@ -83,9 +83,8 @@ fn build() -> Result<()> {
 fn load_hand(root: &Path) -> Result<HandModel> {
     println!("cargo::rerun-if-env-changed=HAND");
     let name = env::var("HAND").ok().filter(|name| !name.is_empty()).unwrap_or_else(|| DEFAULT_HAND.into());
-    let path = root.join(&name);
-    if path.is_file() {
-        println!("cargo::rerun-if-changed={}", path.display());
+    for file in HandModel::files(&name) {
+        println!("cargo::rerun-if-changed={}", root.join(file).display());
     }
     let hand = HandModel::load(&name)
         .map_err(|error| format!("HAND={name} (paths are relative to {}): {error}", root.display()))?;

@@ -24,6 +24,7 @@ mod start;
 #[cfg(test)]
 mod tests;
 mod tree;
+mod urdf;
 
 use crate::plant::contact::{FaceContact, FingertipModel};
 use crate::plant::friction::JointFriction;
@@ -36,9 +37,9 @@ use controller::Setup;
 use library::{Document, Kind};
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 use std::path::Path;
-use tree::{Node, Setting};
+use tree::Setting;
 
-pub use error::{Place, SceneError, suggestion};
+pub use error::{Notice, Place, SceneError, suggestion};
 pub use file::{Actuators, Control, Friction, HandFile, ObjectFile, PlantSettings, SceneFile, Sensors};
 pub use hand_model::HandModel;
 pub use source::config_source;
@@ -146,12 +147,15 @@ impl Scene {
 
     fn from_document(document: Document, settings: &[String]) -> Result<Self, SceneError> {
         let settings = settings.iter().map(|text| Setting::parse(text)).collect::<Result<Vec<_>, _>>()?;
-        let tree = document.complete_scene(&settings)?;
+        let mut notices = Vec::new();
+        let tree = document.complete_scene(&settings, &mut notices)?;
         let file = read::read(&tree, "")?;
-        build::scene(file).map_err(|error| {
+        let mut scene = build::scene(file).map_err(|error| {
             let place = tree.place_of(&error.key).clone();
             error.at(&place)
-        })
+        })?;
+        scene.warnings.splice(0..0, notices.iter().map(Notice::to_string));
+        Ok(scene)
     }
 
     /// Checks and prepares a scene that was put together in code.
@@ -195,14 +199,27 @@ impl Scene {
 }
 
 impl HandFile {
+    /// Names of the built-in hands.
+    pub fn built_in() -> impl Iterator<Item = &'static str> {
+        Kind::Hand.built_in().iter().map(|(name, _)| *name)
+    }
+
     /// Loads a hand by its built-in name or by its path.
     ///
     /// # Errors
     /// What is wrong with the file as a file; a [`Scene`] checks the numbers.
     pub fn load(name_or_path: &str) -> Result<Self, SceneError> {
-        let mut node = open(Kind::Hand, name_or_path)?;
-        library::complete_hand(&mut node);
-        read::read(&node, "")
+        Self::load_with_notices(name_or_path).map(|(file, _)| file)
+    }
+
+    /// The same, with what is odd in the file and its URDF.
+    ///
+    /// # Errors
+    /// As [`Self::load`].
+    pub fn load_with_notices(name_or_path: &str) -> Result<(Self, Vec<Notice>), SceneError> {
+        let mut notices = Vec::new();
+        let node = open(Kind::Hand, name_or_path)?.complete_hand(&mut notices)?;
+        Ok((read::read(&node, "")?, notices))
     }
 }
 
@@ -212,12 +229,10 @@ impl ObjectFile {
     /// # Errors
     /// What is wrong with the file as a file; a [`Scene`] checks the numbers.
     pub fn load(name_or_path: &str) -> Result<Self, SceneError> {
-        read::read(&open(Kind::Object, name_or_path)?, "")
+        read::read(&open(Kind::Object, name_or_path)?.node, "")
     }
 }
 
-fn open(kind: Kind, name_or_path: &str) -> Result<Node, SceneError> {
-    Document::open(kind, name_or_path, Path::new(""))
-        .map(|document| document.node)
-        .map_err(|error| error.at(&Place::whole(name_or_path)))
+fn open(kind: Kind, name_or_path: &str) -> Result<Document, SceneError> {
+    Document::open(kind, name_or_path, Path::new("")).map_err(|error| error.at(&Place::whole(name_or_path)))
 }
