@@ -26,6 +26,8 @@ enum Command {
     Serve(commands::serve::Arguments),
     Replay(commands::replay::Arguments),
     Export(commands::export::Arguments),
+    Object(commands::object::Arguments),
+    Hand(commands::hand::Arguments),
 }
 
 fn main() -> ExitCode {
@@ -40,6 +42,8 @@ fn main() -> ExitCode {
         Command::Serve(arguments) => commands::serve::run(&arguments),
         Command::Replay(arguments) => commands::replay::run(&arguments),
         Command::Export(arguments) => commands::export::run(&arguments),
+        Command::Object(arguments) => commands::object::run(&arguments),
+        Command::Hand(arguments) => commands::hand::run(&arguments),
     };
     match outcome {
         Ok(commands::Outcome::Shown) => ExitCode::SUCCESS,

@@ -5,16 +5,16 @@ use super::{
     build::control,
     check::{Result, fail, name},
     controller::Setup,
-    error::{Place, SceneError},
+    error::{Notice, Place, SceneError},
     file::{Actuators, HandFile, PlantSettings, SCHEMA, Sensors},
     hand::hand,
-    library::{Document, Kind, complete_hand},
+    library::{Document, Kind, is_path},
     read::read,
     source::{IMPORTS, Source, config_source},
 };
 use crate::{Hand, MAX_JOINTS};
 use blindgrasp_shared::tick::{Config, Params};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// How long the host's heartbeat may fail while the hand has torque, ms.
 const HEARTBEAT_MS: u32 = 250;
@@ -65,18 +65,20 @@ impl HandModel {
         Self::from_document(Document::parse(text, source, Path::new(""))?).map(|(model, _)| model)
     }
 
+    /// The files on the disk that a hand is read from: its own, and its URDF. As far as they can be told; none for a hand
+    /// built in.
+    pub fn files(name_or_path: &str) -> Vec<PathBuf> {
+        if !is_path(name_or_path) {
+            return Vec::new();
+        }
+        let document = Document::open(Kind::Hand, name_or_path, Path::new(""));
+        let urdf = document.ok().and_then(|document| document.urdf_path());
+        std::iter::once(name_or_path.into()).chain(urdf).collect()
+    }
+
     fn from_document(document: Document) -> std::result::Result<(Self, HandFile), SceneError> {
-        let mut tree = document.node;
-        complete_hand(&mut tree);
-        let file: HandFile = read(&tree, "")?;
-        let model = Self::build(&file).map_err(|mut error| {
-            // The checks know the keys of a scene.
-            if let Some(key) = error.key.strip_prefix("hand.") {
-                error.key = key.into();
-            }
-            let place = tree.place_of(&error.key).clone();
-            error.at(&place)
-        })?;
+        let (file, mut model, notices) = checked(document, Self::build)?;
+        model.warnings.splice(0..0, notices.iter().map(Notice::to_string));
         Ok((model, file))
     }
 
@@ -160,4 +162,39 @@ pub static CONFIG: Config<f32, JOINTS> = {};
             config_source(&self.config, count),
         )
     }
+}
+
+impl HandFile {
+    /// Loads a hand by its built-in name or by its path, checks it, and prepares its kinematics; with what is odd in it, in
+    /// words. Unlike a [`HandModel`], it may do without `[control]`.
+    ///
+    /// # Errors
+    /// One line: where, which key, what is wrong, what to do.
+    pub fn load_checked(name_or_path: &str) -> std::result::Result<(Self, Hand, Vec<String>), SceneError> {
+        let document = Document::open(Kind::Hand, name_or_path, Path::new(""));
+        let document = document.map_err(|error| error.at(&Place::whole(name_or_path)))?;
+        let mut warnings = Vec::new();
+        let (file, hand, notices) = checked(document, |file| hand(file, &mut warnings))?;
+        warnings.splice(0..0, notices.iter().map(Notice::to_string));
+        Ok((file, hand, warnings))
+    }
+}
+
+/// Reads a hand and checks it; what is wrong gets its place.
+fn checked<T>(
+    document: Document,
+    check: impl FnOnce(&HandFile) -> Result<T>,
+) -> Result<(HandFile, T, Vec<Notice>)> {
+    let mut notices = Vec::new();
+    let tree = document.complete_hand(&mut notices)?;
+    let file: HandFile = read(&tree, "")?;
+    let found = check(&file).map_err(|mut error| {
+        // The checks know the keys of a scene.
+        if let Some(key) = error.key.strip_prefix("hand.") {
+            error.key = key.into();
+        }
+        let place = tree.place_of(&error.key).clone();
+        error.at(&place)
+    })?;
+    Ok((file, found, notices))
 }

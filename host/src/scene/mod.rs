@@ -25,6 +25,7 @@ mod start;
 #[cfg(test)]
 mod tests;
 mod tree;
+mod urdf;
 
 use crate::plant::contact::{FaceContact, FingertipModel};
 use crate::plant::friction::JointFriction;
@@ -34,15 +35,16 @@ use blindgrasp_shared::control::GraspConfig;
 use blindgrasp_shared::math::Real;
 use blindgrasp_shared::tick::Config;
 use controller::Setup;
-use library::{Complete, Document, Kind};
+use library::{Document, Kind};
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 use std::path::Path;
 use tree::Setting;
 
 pub(crate) use error::one_line;
-pub use error::{Place, SceneError, suggestion};
+pub use error::{Notice, Place, SceneError, suggestion};
 pub use file::{Actuators, Control, Friction, HandFile, ObjectFile, PlantSettings, SceneFile, Sensors};
 pub use hand_model::HandModel;
+pub use object::ObjectBody;
 pub use source::config_source;
 
 /// A scene, checked and ready for the simulator.
@@ -148,13 +150,14 @@ impl Scene {
 
     fn from_document(document: Document, settings: &[String]) -> Result<Self, SceneError> {
         let settings = settings.iter().map(|text| Setting::parse(text)).collect::<Result<Vec<_>, _>>()?;
-        let Complete { node: tree, notices } = document.complete_scene(&settings)?;
+        let mut notices = Vec::new();
+        let tree = document.complete_scene(&settings, &mut notices)?;
         let file = read::read(&tree, "")?;
         let mut scene = build::scene(file).map_err(|error| {
             let place = tree.place_of(&error.key).clone();
             error.at(&place)
         })?;
-        scene.warnings.splice(0..0, notices);
+        scene.warnings.splice(0..0, notices.iter().map(Notice::to_string));
         Ok(scene)
     }
 
@@ -199,14 +202,27 @@ impl Scene {
 }
 
 impl HandFile {
+    /// Names of the built-in hands.
+    pub fn built_in() -> impl Iterator<Item = &'static str> {
+        Kind::Hand.built_in().iter().map(|(name, _)| *name)
+    }
+
     /// Loads a hand by its built-in name or by its path.
     ///
     /// # Errors
     /// What is wrong with the file as a file; a [`Scene`] checks the numbers.
     pub fn load(name_or_path: &str) -> Result<Self, SceneError> {
-        let mut node = open(Kind::Hand, name_or_path)?.node;
-        library::complete_hand(&mut node);
-        read::read(&node, "")
+        Self::load_with_notices(name_or_path).map(|(file, _)| file)
+    }
+
+    /// The same, with what is odd in the file and its URDF.
+    ///
+    /// # Errors
+    /// As [`Self::load`].
+    pub fn load_with_notices(name_or_path: &str) -> Result<(Self, Vec<Notice>), SceneError> {
+        let mut notices = Vec::new();
+        let node = open(Kind::Hand, name_or_path)?.complete_hand(&mut notices)?;
+        Ok((read::read(&node, "")?, notices))
     }
 }
 
@@ -216,15 +232,24 @@ impl ObjectFile {
     /// # Errors
     /// What is wrong with the file as a file; a [`Scene`] checks the numbers.
     pub fn load(name_or_path: &str) -> Result<Self, SceneError> {
-        Self::load_noticing(name_or_path).map(|(file, _)| file)
+        Self::load_with_notices(name_or_path).map(|(file, _)| file)
     }
 
-    /// Loads an object by its built-in name or by its path; and says what its mesh had to be repaired of.
+    /// Reads an object from a text. `source` is its name in errors; its mesh is relative to `folder`.
     ///
     /// # Errors
-    /// What is wrong with the file as a file; a [`Scene`] checks the numbers.
-    pub fn load_noticing(name_or_path: &str) -> Result<(Self, Vec<String>), SceneError> {
-        let Complete { node, notices } = open(Kind::Object, name_or_path)?.complete_object()?;
+    /// As [`Self::load`].
+    pub fn parse(text: &str, source: &str, folder: &Path) -> Result<Self, SceneError> {
+        read::read(&Document::parse(text, source, folder)?.complete_object(&mut Vec::new())?, "")
+    }
+
+    /// As [`Self::load`], with what its mesh was repaired of.
+    ///
+    /// # Errors
+    /// As [`Self::load`].
+    pub fn load_with_notices(name_or_path: &str) -> Result<(Self, Vec<Notice>), SceneError> {
+        let mut notices = Vec::new();
+        let node = open(Kind::Object, name_or_path)?.complete_object(&mut notices)?;
         Ok((read::read(&node, "")?, notices))
     }
 }

@@ -12,10 +12,30 @@ use nalgebra::{Matrix3, SymmetricEigen, Vector3};
 const FLAT: f64 = 1e-3;
 
 /// An object, checked.
-pub(super) struct Body {
-    pub(super) shape: Polyhedron,
-    pub(super) mass_kg: f64,
-    pub(super) inertia_kg_m2: Matrix3<f64>,
+#[derive(Clone, Debug, PartialEq)]
+pub struct ObjectBody {
+    /// Its shape in its own frame.
+    pub shape: Polyhedron,
+    /// Its mass, kg.
+    pub mass_kg: f64,
+    /// Its inertia about its centre of mass in its own frame, kg m^2.
+    pub inertia_kg_m2: Matrix3<f64>,
+}
+
+impl ObjectFile {
+    /// Shape, mass and inertia, with what is odd about them. A shape alone, without mass and density, weighs what water does.
+    ///
+    /// # Errors
+    /// What is wrong, with the key in the object's file.
+    pub fn body(&self, warnings: &mut Vec<String>) -> Result<ObjectBody> {
+        let bare = self.mass_kg.is_none() && self.density_kg_m3.is_none();
+        let weighed =
+            ObjectFile { density_kg_m3: bare.then_some(1000.0).or(self.density_kg_m3), ..self.clone() };
+        object(&weighed, warnings).map_err(|mut error| {
+            error.key = error.key.trim_start_matches("object.").to_owned();
+            error
+        })
+    }
 }
 
 /// The polyhedron of a shape.
@@ -43,7 +63,7 @@ pub(super) fn polyhedron(shape: &ShapeFile) -> std::result::Result<Polyhedron, P
 }
 
 /// Checks an object and computes its mass and inertia.
-pub(super) fn object(file: &ObjectFile, warnings: &mut Vec<String>) -> Result<Body> {
+pub(super) fn object(file: &ObjectFile, warnings: &mut Vec<String>) -> Result<ObjectBody> {
     if let ShapeFile::Mesh { flat_deg, flat_m, .. } = &file.shape {
         within("object.shape.mesh.flat_deg", *flat_deg, 0.0, 45.0)?;
         within("object.shape.mesh.flat_m", flat_m.unwrap_or_default(), 0.0, 1.0)?;
@@ -112,7 +132,7 @@ pub(super) fn object(file: &ObjectFile, warnings: &mut Vec<String>) -> Result<Bo
             inertia
         }
     };
-    Ok(Body { shape, mass_kg, inertia_kg_m2 })
+    Ok(ObjectBody { shape, mass_kg, inertia_kg_m2 })
 }
 
 /// A symmetric tensor from the three or six numbers of a file.

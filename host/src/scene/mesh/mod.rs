@@ -36,9 +36,9 @@ mod unit;
 mod weld;
 
 use super::check::{Result, within};
-use super::error::{Place, SceneError, suggestion};
+use super::error::{Notice, Place, SceneError, suggestion};
 use super::file::ShapeFile;
-use super::library::Folder;
+use super::library::Home;
 use super::tree::{Entry, Node, Value};
 use repair::{Repaired, repair};
 use soup::{Problem, Soup};
@@ -49,17 +49,19 @@ pub use unit::Unit;
 /// What a mesh file may be scaled by.
 const SCALES: [f64; 2] = [1e-6, 1e6];
 
-/// Puts vertices and triangles in the place of the mesh file that an object (of the given key; empty for the object's own
-/// file) names, if it does. What was repaired is said in words.
-pub(super) fn expand(object: &mut Node, key: &str, folder: &Folder) -> Result<Vec<String>> {
+/// What to do about what was repaired.
+const REPAIRED: &str = "it is used as repaired";
+
+/// Puts vertices and triangles in the place of the mesh file that an object names, if it does; notices say what was repaired.
+pub(super) fn expand(object: &mut Node, home: &Home, notices: &mut Vec<Notice>) -> Result<()> {
     let Some(mesh) = object.get_mut("shape").and_then(|shape| shape.get_mut("mesh")) else {
-        return Ok(Vec::new());
+        return Ok(());
     };
-    let key = if key.is_empty() { "shape.mesh".to_owned() } else { format!("{key}.shape.mesh") };
-    let Some(entry) = take(mesh, "file") else { return Ok(Vec::new()) };
+    let Some(entry) = take(mesh, "file") else { return Ok(()) };
     let place = entry.place;
+    let key = |name: &str| format!("shape.mesh.{name}");
     let fail = |name: &str, problem: String, remedy: String, place: &Place| {
-        Err(SceneError::new(format!("{key}.{name}"), problem, remedy).at(place))
+        Err(SceneError::new(key(name), problem, remedy).at(place))
     };
     let Value::String(file) = &entry.node.value else {
         return fail("file", "is no name".into(), "write file = \"part.stl\"".into(), &place);
@@ -77,19 +79,15 @@ pub(super) fn expand(object: &mut Node, key: &str, folder: &Folder) -> Result<Ve
                 Value::Integer(value) => value as f64,
                 _ => return fail("scale", "is no number".into(), "write scale = 1.0".into(), &entry.place),
             };
-            within(&format!("{key}.scale"), value, SCALES[0], SCALES[1])
-                .map_err(|error| error.at(&entry.place))?;
+            within(&key("scale"), value, SCALES[0], SCALES[1]).map_err(|error| error.at(&entry.place))?;
             value
         }
     };
     let unit = take(mesh, "unit");
-    let on_command_line = *entry.node.place.source == *"--set";
-    let folder = if on_command_line { &Folder::Disk(PathBuf::new()) } else { folder };
     let of_file = |problem: Problem| {
-        SceneError::new(format!("{key}.file"), format!("`{file}`: {}", problem.what), problem.remedy)
-            .at(&place)
+        SceneError::new(key("file"), format!("`{file}`: {}", problem.what), problem.remedy).at(&place)
     };
-    let soup = parse(file, folder).map_err(of_file)?;
+    let soup = parse(file, home, &entry.node.place).map_err(of_file)?;
     let unit = match unit.as_ref().map(|entry| (&entry.node.value, &entry.place)) {
         Some((Value::String(word), place)) => match Unit::of(word) {
             Some(unit) => unit,
@@ -105,7 +103,7 @@ pub(super) fn expand(object: &mut Node, key: &str, folder: &Folder) -> Result<Ve
         }
     };
     let mesh_of = body(soup, unit, scale).map_err(of_file)?;
-    let Value::Table(entries) = &mut mesh.value else { return Ok(Vec::new()) };
+    let Value::Table(entries) = &mut mesh.value else { return Ok(()) };
     let node = |value| Node { value, place: place.clone() };
     let list = |items: Vec<Value>| node(Value::Array(items.into_iter().map(node).collect()));
     let vertices =
@@ -119,8 +117,12 @@ pub(super) fn expand(object: &mut Node, key: &str, folder: &Folder) -> Result<Ve
         let node = node(Value::Array(items));
         entries.push(Entry { key: name.into(), place: place.clone(), node });
     }
-    let name = Path::new(file).file_name().map_or(file.clone(), |name| name.to_string_lossy().into_owned());
-    Ok(mesh_of.notices.into_iter().map(|notice| format!("`{name}`: {notice}")).collect())
+    notices.extend(mesh_of.notices.into_iter().map(|notice| Notice {
+        place: place.clone(),
+        what: format!("`{file}`: {notice}"),
+        remedy: REPAIRED.to_owned(),
+    }));
+    Ok(())
 }
 
 /// Takes an entry out of a table.
@@ -134,16 +136,18 @@ fn take(table: &mut Node, key: &str) -> Option<Entry> {
 ///
 /// # Errors
 /// One line: which file, what is wrong, what to do.
-pub fn load(path: &str, unit: Option<Unit>) -> Result<(ShapeFile, Vec<String>)> {
-    let of_file =
-        |problem: Problem| SceneError::new("", problem.what, problem.remedy).at(&Place::whole(path));
-    let soup = parse(path, &Folder::Disk(PathBuf::new())).map_err(of_file)?;
+pub fn load(path: &str, unit: Option<Unit>) -> Result<(ShapeFile, Vec<Notice>)> {
+    let place = Place::whole(path);
+    let of_file = |problem: Problem| SceneError::new("", problem.what, problem.remedy).at(&place);
+    let soup = parse(path, &Home::Folder(PathBuf::new()), &place).map_err(of_file)?;
     let Some(unit) = unit else {
         let remedy = Unit::choices(&soup.size(), |word| format!("--unit {word}"));
         return Err(of_file(Problem::new("a mesh file does not say its unit", remedy)));
     };
     let Repaired { vertices, triangles, notices } = body(soup, unit, 1.0).map_err(of_file)?;
-    Ok((ShapeFile::mesh(vertices.into_iter().map(Into::into).collect(), triangles), notices))
+    let notice = |what| Notice { place: place.clone(), what, remedy: REPAIRED.to_owned() };
+    let shape = ShapeFile::mesh(vertices.into_iter().map(Into::into).collect(), triangles);
+    Ok((shape, notices.into_iter().map(notice).collect()))
 }
 
 /// Whether a name is that of a mesh file.
@@ -156,14 +160,14 @@ fn ending(name: &str) -> Option<String> {
 }
 
 /// Reads a file by its name's ending.
-fn parse(name: &str, folder: &Folder) -> std::result::Result<Soup, Problem> {
+fn parse(name: &str, home: &Home, named_at: &Place) -> std::result::Result<Soup, Problem> {
     let read = match ending(name).as_deref() {
         Some("stl") => stl::read,
         Some("obj") => obj::read,
         _ => return Err(Problem::new("is neither .stl nor .obj", "export it as STL or OBJ")),
     };
-    let bytes = folder.bytes(name, limits::LARGEST_FILE);
-    read(bytes.map_err(|error| Problem::new(error.problem, error.remedy))?)
+    let bytes = home.mesh(name, named_at, limits::LARGEST_FILE);
+    read(bytes.map_err(|error| Problem::new(error.problem, error.remedy))?.into_owned())
 }
 
 /// From what the file says to a closed surface in metres.

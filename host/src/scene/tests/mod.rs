@@ -9,16 +9,16 @@ use crate::Posture;
 use crate::scene::file::{ContactFile, Indentation, InertiaFile, ShapeFile};
 
 /// A sequence of numbers that is the same everywhere.
-struct Numbers(u64);
+pub(super) struct Numbers(pub(super) u64);
 
 impl Numbers {
     /// In [0, 1).
-    fn next(&mut self) -> f64 {
+    pub(super) fn next(&mut self) -> f64 {
         self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
         (self.0 >> 11) as f64 / (1u64 << 53) as f64
     }
 
-    fn below(&mut self, count: usize) -> usize {
+    pub(super) fn below(&mut self, count: usize) -> usize {
         (self.next() * count as f64) as usize
     }
 
@@ -278,11 +278,19 @@ fn references_are_relative_to_the_file() {
         format!("{missing}: no such file; check the path")
     );
     let a_folder = folder.join("parts").to_str().unwrap().to_string();
-    assert_eq!(load(&a_folder, &[]).unwrap_err().to_string(), format!("{a_folder}: not a file; name a file"));
-    let large = write("large.toml", &vec![b'#'; 5 << 20]);
+    assert_eq!(
+        load(&a_folder, &[]).unwrap_err().to_string(),
+        format!("{a_folder}: not a file; name a .toml file")
+    );
+    let large = write("large.toml", &vec![b'#'; 33 << 20]);
     assert_eq!(
         load(&large, &[]).unwrap_err().to_string(),
-        format!("{large}: 5 MiB are too many; check the path")
+        format!("{large}: 33 MiB are too many; check the path")
+    );
+    let many = write("many.toml", &vec![b','; 2_000_001]);
+    assert_eq!(
+        load(&many, &[]).unwrap_err().to_string(),
+        format!("{many}: 2000001 values are too many; check the path")
     );
     let windows = write("windows.toml", text("cube").replace('\n', "\r\n").as_bytes());
     assert_eq!(load(&windows, &[]).map(|scene| scene.name), Ok("cube".into()));

@@ -1,0 +1,1 @@
+//! What a check says of objects that are good, odd, and none.
