@@ -3,6 +3,7 @@
 pub(crate) mod console;
 pub(crate) mod export;
 pub(crate) mod flash;
+pub(crate) mod hand;
 pub(crate) mod monitor;
 pub(crate) mod pil;
 mod ports;

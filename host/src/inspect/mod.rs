@@ -8,3 +8,4 @@
 //! - a **notice** is worth knowing, and may be as it was meant.
 
 pub mod finding;
+pub mod hand;

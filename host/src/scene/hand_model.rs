@@ -7,7 +7,7 @@ use super::{
     controller::Setup,
     error::{Place, SceneError},
     file::{Actuators, HandFile, PlantSettings, SCHEMA, Sensors},
-    hand::hand,
+    hand::{hand, kinematics},
     library::{Document, Kind, complete_hand},
     read::read,
     source::{IMPORTS, Source, config_source},
@@ -69,11 +69,7 @@ impl HandModel {
         let mut tree = document.node;
         complete_hand(&mut tree);
         let file: HandFile = read(&tree, "")?;
-        let model = Self::build(&file).map_err(|mut error| {
-            // The checks know the keys of a scene.
-            if let Some(key) = error.key.strip_prefix("hand.") {
-                error.key = key.into();
-            }
+        let model = Self::build(&file).map_err(|error| {
             let place = tree.place_of(&error.key).clone();
             error.at(&place)
         })?;
@@ -94,15 +90,9 @@ impl HandModel {
         crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC).checksum(self.source().as_bytes())
     }
 
-    fn build(file: &HandFile) -> Result<Self> {
-        if file.schema != SCHEMA {
-            return fail(
-                "schema",
-                format!("{} is a format that this program does not know", file.schema),
-                format!("write it as format {SCHEMA}"),
-            );
-        }
-        name("name", &file.name)?;
+    pub(crate) fn build(file: &HandFile) -> Result<Self> {
+        let mut warnings = Vec::new();
+        let hand = file.prepare(&mut warnings)?;
         let Some(gains) = &file.control else {
             return fail(
                 "control",
@@ -110,9 +100,6 @@ impl HandModel {
                 "add a table [control] with the keys that a scene's has: force_n, attitude_stiffness_nm, ...",
             );
         };
-        control(gains)?;
-        let mut warnings = Vec::new();
-        let hand = hand(file, &mut warnings)?;
         let setup = Setup {
             joints: &file.joints,
             control: gains,
@@ -160,4 +147,33 @@ pub static CONFIG: Config<f32, JOINTS> = {};
             config_source(&self.config, count),
         )
     }
+}
+
+impl HandFile {
+    /// Checks all that every hand needs, and prepares it. A firmware needs the table `[control]` as well.
+    pub(crate) fn prepare(&self, warnings: &mut Vec<String>) -> Result<Hand> {
+        if self.schema != SCHEMA {
+            return fail(
+                "schema",
+                format!("{} is a format that this program does not know", self.schema),
+                format!("write it as format {SCHEMA}"),
+            );
+        }
+        name("name", &self.name)?;
+        self.control.as_ref().map_or(Ok(()), control)?;
+        hand(self, warnings).map_err(as_of_hand)
+    }
+
+    /// The kinematics and masses, whatever size the numbers have: for those who look into what is wrong with a hand.
+    pub(crate) fn kinematics(&self) -> Result<Hand> {
+        kinematics(self).map_err(as_of_hand)
+    }
+}
+
+/// The checks know the keys of a scene.
+fn as_of_hand(mut error: SceneError) -> SceneError {
+    if let Some(key) = error.key.strip_prefix("hand.") {
+        error.key = key.into();
+    }
+    error
 }

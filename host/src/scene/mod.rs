@@ -41,7 +41,9 @@ use tree::{Node, Setting};
 pub(crate) use error::one_line;
 pub use error::{Place, SceneError, suggestion};
 pub use file::{Actuators, Control, Friction, HandFile, ObjectFile, PlantSettings, SceneFile, Sensors};
+pub(crate) use hand::{moving_masses, posture};
 pub use hand_model::HandModel;
+pub(crate) use object::breaks_triangle;
 pub use source::config_source;
 
 /// A scene, checked and ready for the simulator.
@@ -201,9 +203,34 @@ impl HandFile {
     /// # Errors
     /// What is wrong with the file as a file; a [`Scene`] checks the numbers.
     pub fn load(name_or_path: &str) -> Result<Self, SceneError> {
-        let mut node = open(Kind::Hand, name_or_path)?;
+        Self::load_with_places(name_or_path).map(|(file, _)| file)
+    }
+
+    /// The same, with where its values come from.
+    pub(crate) fn load_with_places(name_or_path: &str) -> Result<(Self, Places), SceneError> {
+        Self::from_document(open(Kind::Hand, name_or_path)?)
+    }
+
+    /// Reads a hand from a text; `source` is its name in places.
+    pub(crate) fn parse_with_places(text: &str, source: &str) -> Result<(Self, Places), SceneError> {
+        Self::from_document(Document::parse(text, source, Path::new(""))?)
+    }
+
+    fn from_document(document: Document) -> Result<(Self, Places), SceneError> {
+        let mut node = document.node;
         library::complete_hand(&mut node);
-        read::read(&node, "")
+        Ok((read::read(&node, "")?, Places(node)))
+    }
+}
+
+/// Where the values of a file come from.
+#[derive(Clone, Debug)]
+pub(crate) struct Places(Node);
+
+impl Places {
+    /// The place of a key, or that of the nearest thing around it.
+    pub(crate) fn of(&self, key: &str) -> Place {
+        self.0.place_of(key).clone()
     }
 }
 
@@ -213,12 +240,10 @@ impl ObjectFile {
     /// # Errors
     /// What is wrong with the file as a file; a [`Scene`] checks the numbers.
     pub fn load(name_or_path: &str) -> Result<Self, SceneError> {
-        read::read(&open(Kind::Object, name_or_path)?, "")
+        read::read(&open(Kind::Object, name_or_path)?.node, "")
     }
 }
 
-fn open(kind: Kind, name_or_path: &str) -> Result<Node, SceneError> {
-    Document::open(kind, name_or_path, Path::new(""))
-        .map(|document| document.node)
-        .map_err(|error| error.at(&Place::whole(name_or_path)))
+fn open(kind: Kind, name_or_path: &str) -> Result<Document, SceneError> {
+    Document::open(kind, name_or_path, Path::new("")).map_err(|error| error.at(&Place::whole(name_or_path)))
 }
