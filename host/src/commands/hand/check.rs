@@ -6,7 +6,6 @@ use blindgrasp::inspect::finding::Verdict;
 use blindgrasp::inspect::hand::HandCheck;
 use clap::Args;
 use std::io::{self, Write as _};
-use std::path::PathBuf;
 
 /// Show what a hand is (tree, joints, reach, masses, forces) and find what is wrong with it
 ///

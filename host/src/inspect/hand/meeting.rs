@@ -14,6 +14,10 @@ use nalgebra::Vector3;
 const STARTS: usize = 24;
 /// Turns from one start.
 const TURNS: usize = 150;
+/// A turn that comes no nearer than this share of the way left has stalled, ...
+const STALLED: f64 = 0.995;
+/// ... and after so many of them in a row the search is given up.
+const PATIENCE: usize = 5;
 /// A search that is as near as this, in radii of a fingertip, is left to the inverse kinematics.
 const NEAR: f64 = 1e-3;
 
@@ -66,13 +70,20 @@ fn meet(specimen: &Specimen, fingertips: &[usize], ball_radius_m: f64) -> Option
         _ => random_angles(specimen, &joints, &mut random),
     });
     for mut angles in starts {
+        let (mut nearest, mut stalled) = (f64::INFINITY, 0);
         for _ in 0..TURNS {
             let Some((centre, targets)) = targets(specimen, fingertips, ball_radius_m, &angles) else {
                 break;
             };
             let tips = posture(&specimen.hand, &angles).centres_m;
             let errors = fingertips.iter().zip(&targets).map(|(&i, target)| (tips[i] - target).norm());
-            if errors.fold(0.0, f64::max) < NEAR * specimen.mean_radius_m() {
+            let error = errors.fold(0.0, f64::max);
+            stalled = if error < STALLED * nearest { 0 } else { stalled + 1 };
+            nearest = nearest.min(error);
+            if stalled > PATIENCE {
+                break;
+            }
+            if error < NEAR * specimen.mean_radius_m() {
                 if is_confirmed(specimen, fingertips, &targets, &angles) {
                     return Some(Meeting {
                         fingertips: fingertips.to_vec(),

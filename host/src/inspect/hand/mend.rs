@@ -3,11 +3,15 @@
 //! Each joint is put before the loader alone, on a small hand of its own, and what is refused is replaced by something
 //! harmless until nothing is left; then the tree as a whole. So every refusal is the loader's own, and none hides another.
 
+use super::rules::numbers::direction;
 use crate::Hand;
 use crate::scene::file::{FingertipFile, InertiaFile, JointFile, SCHEMA};
 use crate::scene::{Control, HandFile, SceneError};
 use std::collections::BTreeSet;
 use std::f64::consts::PI;
+
+/// Numbers beyond are not computed with, in whatever unit they are.
+const LARGEST: f64 = 1e6;
 
 type Accept = fn(&HandFile) -> Result<Hand, SceneError>;
 
@@ -18,13 +22,16 @@ pub(super) fn refused_numbers(file: &HandFile) -> Vec<SceneError> {
 }
 
 /// Replaces the numbers that no kinematics can be computed with; those that are only out of range stay. Returns whether it
-/// is still known where everything is.
+/// is still known where everything is, and can be computed with.
 pub(super) fn mend_kinematics(file: &mut HandFile) -> bool {
-    let directed = |joint: &JointFile| joint.axis.iter().any(|v| *v != 0.0);
-    let known = file.joints.iter().all(directed);
-    let errors = mend_numbers(file, HandFile::kinematics);
-    known
-        && !errors.iter().any(|error| ["offset_m", "rotation_rpy_rad"].iter().any(|k| error.key.ends_with(k)))
+    let small = |values: &[f64]| values.iter().all(|v| v.abs() < LARGEST);
+    let joints = file.joints.iter().all(|joint| {
+        let lengths = joint.offset_m.iter().chain(&joint.mass_centre_m).chain(&joint.rotation_rpy_rad);
+        direction(joint.axis).is_some() && lengths.chain([&joint.mass_kg]).all(|v| small(&[*v]))
+    });
+    let tips = file.fingertips.iter().all(|tip| small(&tip.offset_m) && small(&[tip.radius_m]));
+    mend_numbers(file, HandFile::kinematics);
+    joints && tips
 }
 
 fn mend_numbers(file: &mut HandFile, accept: Accept) -> Vec<SceneError> {
@@ -145,11 +152,7 @@ fn mend_joint(joint: &mut JointFile, key: &str) {
         "name" => joint.name = sound.name,
         "offset_m" => joint.offset_m = sound.offset_m,
         "rotation_rpy_rad" => joint.rotation_rpy_rad = sound.rotation_rpy_rad,
-        "axis" => {
-            let length = nalgebra::Vector3::from(joint.axis).norm();
-            let has_direction = length > 0.0 && length.is_finite();
-            joint.axis = if has_direction { joint.axis.map(|v| v / length) } else { sound.axis };
-        }
+        "axis" => joint.axis = direction(joint.axis).unwrap_or(sound.axis),
         "limits_rad" => {
             let [a, b] = joint.limits_rad;
             let has_range = finite(&[a, b]) && a != b && a.abs().max(b.abs()) <= 100.0;

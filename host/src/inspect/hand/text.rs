@@ -1,5 +1,6 @@
 //! A check for people: the tree, tables, and the findings.
 
+use super::rules::length;
 use super::{HandCheck, JointFacts, MeetingFacts};
 use std::fmt::Write as _;
 
@@ -47,7 +48,7 @@ fn branch(check: &HandCheck, joint: Option<usize>, indent: &str, text: &mut Stri
         below
     };
     for tip in tips {
-        line(text, format!("fingertip {}, radius {}", tip.name, mm(tip.radius_m)));
+        line(text, format!("fingertip {}, radius {}", tip.name, length(tip.radius_m)));
     }
     for k in carried {
         let below = line(text, check.joints[k].name.clone());
@@ -64,12 +65,12 @@ fn joints(check: &HandCheck) -> String {
             joint.number.to_string(),
             joint.name.clone(),
             joint.axis_in_base.map_or_else(|| "?".into(), axis),
-            format!("{lower:.2} .. {upper:.2}"),
-            format!("{:.2}", joint.nominal_rad),
+            format!("{} .. {}", figures(lower), figures(upper)),
+            figures(joint.nominal_rad),
             joint.closing.map_or_else(String::new, |closing| format!("{closing:+.2}")),
             figures(joint.torque_limit_nm),
             figures(joint.speed_limit_rad_s),
-            format!("{}", joint.encoder_counts_per_turn),
+            figures(joint.encoder_counts_per_turn),
             moves(check, joint),
         ]
     };
@@ -149,6 +150,9 @@ fn totals(check: &HandCheck, text: &mut String) {
             ),
         );
     }
+    if check.masses.is_none() {
+        line("unknown", "reach, masses, forces and where the fingertips meet: mend the errors first".into());
+    }
     if let Some(meeting) = &check.meeting {
         let everyone = check.fingertips.len();
         let who = |meeting: &MeetingFacts| match meeting.fingertips.len() {
@@ -159,7 +163,7 @@ fn totals(check: &HandCheck, text: &mut String) {
             format!(
                 "{} around a ball of {} radius at {}",
                 who(meeting),
-                mm(meeting.ball_radius_m),
+                length(meeting.ball_radius_m),
                 point(&meeting.centre_m)
             )
         };
@@ -187,10 +191,6 @@ fn figures(value: f64) -> String {
         size if size < 1e7 => format!("{value:.0}"),
         _ => format!("{value:.2e}"),
     }
-}
-
-fn mm(m: f64) -> String {
-    format!("{} mm", (m * 1e4).round() / 10.0)
 }
 
 fn point(m: &[f64; 3]) -> String {

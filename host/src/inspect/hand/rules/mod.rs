@@ -13,7 +13,7 @@ pub(super) mod shape;
 const MANY: usize = 3;
 
 /// A length in words.
-fn length(m: f64) -> String {
+pub(super) fn length(m: f64) -> String {
     match m.abs() {
         0.0 => "0 mm".to_owned(),
         size if size < 1e-3 => format!("{:.3} mm", m * 1e3),

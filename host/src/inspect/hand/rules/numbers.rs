@@ -28,20 +28,31 @@ const AXIS_TOLERANCE: f64 = 1e-5;
 /// Axes have to have length one.
 pub(in super::super) fn axes(file: &HandFile, found: &mut Found) {
     for (k, joint) in file.joints.iter().enumerate() {
-        let axis = Vector3::from(joint.axis);
-        let length = axis.norm();
-        let (what, remedy) = if !(length > 0.0 && length.is_finite()) {
-            (format!("its axis {:?} has no direction", joint.axis), "give a unit vector".to_owned())
-        } else if !((length - 1.0).abs() < AXIS_TOLERANCE) {
-            let unit = (axis / length).map(|v| (v * 1e7).round() / 1e7 + 0.0);
-            let what =
-                format!("its axis {:?} has length {}, not 1", joint.axis, (length * 1e6).round() / 1e6);
-            (what, format!("write {:?}", <[f64; 3]>::from(unit)))
-        } else {
-            continue;
+        let axis = joint.axis;
+        let (what, remedy) = match (direction(axis), norm(axis)) {
+            (None, _) => (format!("its axis {axis:?} has no direction"), "give a unit vector".to_owned()),
+            (Some(_), length) if (length - 1.0).abs() < AXIS_TOLERANCE => continue,
+            (Some(unit), length) => {
+                let unit = unit.map(|v| (v * 1e7).round() / 1e7 + 0.0);
+                let length = if length < 1e6 { (length * 1e6).round() / 1e6 } else { length };
+                (format!("its axis {axis:?} has length {length:?}, not 1"), format!("write {unit:?}"))
+            }
         };
         found.push(on_joint(file, Severity::Error, k, "axis", what, remedy));
     }
+}
+
+/// The unit vector along an axis, whatever length that has.
+pub(in super::super) fn direction(axis: [f64; 3]) -> Option<[f64; 3]> {
+    let axis = Vector3::from(axis);
+    // Squares of large numbers are none.
+    (axis / axis.amax()).try_normalize(0.0).filter(|axis| axis.iter().all(|v| v.is_finite())).map(Into::into)
+}
+
+/// The length of a vector; of one that is too large to be squared, that of its largest component.
+fn norm(vector: [f64; 3]) -> f64 {
+    let vector = Vector3::from(vector);
+    if vector.amax() > 1e150 { vector.amax() } else { vector.norm() }
 }
 
 /// Angles beyond a whole turn are degrees, or a joint that turns and turns, which this hand can't have.
@@ -100,7 +111,6 @@ pub(in super::super) fn radii(file: &HandFile, found: &mut Found) {
 
 /// The keys of all bones, and their lengths, m.
 fn bones(file: &HandFile) -> Vec<(String, f64)> {
-    let norm = |offset: [f64; 3]| Vector3::from(offset).norm();
     let joints = file.joints.iter().map(|joint| norm(joint.offset_m)).enumerate();
     let tips = file.fingertips.iter().map(|tip| norm(tip.offset_m)).enumerate();
     let keyed =
