@@ -96,8 +96,8 @@ impl fmt::Display for Notice {
     }
 }
 
-/// Keys and names come from files and may contain anything, at any length.
-fn one_line(text: &str) -> String {
+/// A text without control characters, cut where it is too long: keys and names come from files and may contain anything.
+pub(crate) fn one_line(text: &str) -> String {
     let mut clean = String::new();
     for c in text.chars() {
         if clean.len() > LONGEST_LINE {
