@@ -17,6 +17,7 @@ struct Cli {
 #[derive(Subcommand)]
 enum Command {
     Sim(commands::sim::Arguments),
+    Hand(commands::hand::Arguments),
     Pil(commands::pil::Arguments),
     Flash(commands::flash::Arguments),
     Console(commands::console::Arguments),
@@ -27,12 +28,12 @@ enum Command {
     Replay(commands::replay::Arguments),
     Export(commands::export::Arguments),
     Object(commands::object::Arguments),
-    Hand(commands::hand::Arguments),
 }
 
 fn main() -> ExitCode {
     let outcome = match Cli::parse().command {
         Command::Sim(arguments) => commands::sim::run(&arguments),
+        Command::Hand(arguments) => commands::hand::run(&arguments),
         Command::Pil(arguments) => commands::pil::run(&arguments),
         Command::Flash(arguments) => commands::flash::run(&arguments),
         Command::Console(arguments) => commands::console::run(&arguments),
@@ -43,7 +44,6 @@ fn main() -> ExitCode {
         Command::Replay(arguments) => commands::replay::run(&arguments),
         Command::Export(arguments) => commands::export::run(&arguments),
         Command::Object(arguments) => commands::object::run(&arguments),
-        Command::Hand(arguments) => commands::hand::run(&arguments),
     };
     match outcome {
         Ok(commands::Outcome::Shown) => ExitCode::SUCCESS,

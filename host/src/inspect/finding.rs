@@ -5,6 +5,9 @@ use crate::scene::{Place, one_line};
 use serde::ser::{Serialize, SerializeStruct, Serializer};
 use std::fmt;
 
+/// As many findings of a kind are told one by one.
+const LARGEST_GROUP_TOLD: usize = 3;
+
 /// How bad a finding is. The worst comes first in order.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, serde::Serialize)]
 #[serde(rename_all = "lowercase")]
@@ -88,18 +91,37 @@ impl Finding {
 
 impl fmt::Display for Finding {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.line(0))
+    }
+}
+
+impl Finding {
+    /// The line, for this and so many other subjects.
+    fn line(&self, others: usize) -> String {
         let mut line = format!("{}: ", self.severity);
         if let Some(place) = &self.place {
             line += &format!("{place}: ");
         }
-        if !self.subject.is_empty() {
-            line = line + &self.subject + ": ";
+        let others = match others {
+            0 => String::new(),
+            1 => " and another".to_owned(),
+            others => format!(" and {others} others"),
+        };
+        if !self.subject.is_empty() || !others.is_empty() {
+            line = line + &self.subject + &others + ": ";
         }
         line += &self.what;
         if !self.remedy.is_empty() {
             line = line + "; " + &self.remedy;
         }
-        f.write_str(&one_line(&line))
+        one_line(&line)
+    }
+
+    /// What is wrong without names and numbers: the same for findings of a kind.
+    fn kind(&self) -> String {
+        let quoted = self.what.split('`').step_by(2);
+        let words = quoted.flat_map(|part| part.split([' ', ',', '[', ']', '(', ')']));
+        words.filter(|word| !word.contains(|c: char| c.is_ascii_digit())).collect::<Vec<_>>().join(" ")
     }
 }
 
@@ -172,6 +194,29 @@ impl Findings {
     pub fn sort(&mut self) {
         let line = |finding: &Finding| finding.place.as_ref().map_or(0, |place| place.line);
         self.0.sort_by_key(|finding| (finding.severity, line(finding)));
+    }
+
+    /// A line for each, as people want to read them: of findings that differ in names and numbers only, the first and how
+    /// many others there are, if they come from one place (a default) or are more than three.
+    pub fn lines(&self) -> Vec<String> {
+        let mut told = vec![false; self.0.len()];
+        let mut lines = Vec::new();
+        for (first, finding) in self.0.iter().enumerate() {
+            if told[first] {
+                continue;
+            }
+            let alike = |k: &usize| {
+                let other = &self.0[*k];
+                !told[*k] && other.severity == finding.severity && other.kind() == finding.kind()
+            };
+            let mut group: Vec<usize> = (first + 1..self.0.len()).filter(alike).collect();
+            if group.len() < LARGEST_GROUP_TOLD {
+                group.retain(|&k| finding.place.is_some() && self.0[k].place == finding.place);
+            }
+            group.iter().for_each(|&k| told[k] = true);
+            lines.push(finding.line(group.len()));
+        }
+        lines
     }
 
     /// How many there are of each severity.
@@ -274,6 +319,27 @@ mod tests {
         }
         findings.sort();
         assert_eq!(findings.iter().map(|finding| finding.what.as_str()).collect::<String>(), "abcd");
+    }
+
+    #[test]
+    fn findings_of_a_kind_are_told_in_one_line() {
+        let one = |joint: usize, at: usize| {
+            let what =
+                format!("its mass of {joint}.5e-3 kg is more than `link-{joint}` [{joint}, 2] can have");
+            Finding::new(Severity::Warning, what, format!("give {joint}"))
+                .about(format!("joint `{joint}`"))
+                .at(line(at))
+        };
+        let mut findings = Findings::default();
+        findings.extend([one(1, 7), one(2, 7), one(3, 8)]);
+        findings.push(Finding::new(Severity::Warning, "another", ""));
+        let told = "its mass of 1.5e-3 kg is more than `link-1` [1, 2] can have; give 1";
+        assert_eq!(findings.lines()[0], format!("warning: hand.toml:7: joint `1` and another: {told}"));
+        assert_eq!(findings.lines()[1], findings.0[2].to_string());
+        assert_eq!(findings.lines().len(), 3);
+        findings.push(one(4, 9));
+        assert_eq!(findings.lines()[0], format!("warning: hand.toml:7: joint `1` and 3 others: {told}"));
+        assert_eq!(findings.lines()[1..], ["warning: another"]);
     }
 
     #[cfg(feature = "command")]

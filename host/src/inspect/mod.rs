@@ -8,4 +8,5 @@
 //! - a **notice** is worth knowing, and may be as it was meant.
 
 pub mod finding;
+pub mod hand;
 pub mod object;

@@ -13,5 +13,6 @@ pub mod model;
 pub mod polyhedron;
 mod surroundings;
 
+pub use coupling::MAX_CHAIN;
 pub use integrator::Plant;
 pub use model::{ContactForce, Lost, ModelError, Motion, ObjectModel, PlantModel};

@@ -7,9 +7,8 @@ use super::{
     controller::Setup,
     error::{Notice, Place, SceneError},
     file::{Actuators, HandFile, PlantSettings, SCHEMA, Sensors},
-    hand::hand,
+    hand::{hand, kinematics},
     library::{Document, Kind, is_path},
-    read::read,
     source::{IMPORTS, Source, config_source},
 };
 use crate::{Hand, MAX_JOINTS};
@@ -96,15 +95,9 @@ impl HandModel {
         crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC).checksum(self.source().as_bytes())
     }
 
-    fn build(file: &HandFile) -> Result<Self> {
-        if file.schema != SCHEMA {
-            return fail(
-                "schema",
-                format!("{} is a format that this program does not know", file.schema),
-                format!("write it as format {SCHEMA}"),
-            );
-        }
-        name("name", &file.name)?;
+    pub(crate) fn build(file: &HandFile) -> Result<Self> {
+        let mut warnings = Vec::new();
+        let hand = file.prepare(&mut warnings)?;
         let Some(gains) = &file.control else {
             return fail(
                 "control",
@@ -112,9 +105,6 @@ impl HandModel {
                 "add a table [control] with the keys that a scene's has: force_n, attitude_stiffness_nm, ...",
             );
         };
-        control(gains)?;
-        let mut warnings = Vec::new();
-        let hand = hand(file, &mut warnings)?;
         let setup = Setup {
             joints: &file.joints,
             control: gains,
@@ -174,9 +164,28 @@ impl HandFile {
         let document = Document::open(Kind::Hand, name_or_path, Path::new(""));
         let document = document.map_err(|error| error.at(&Place::whole(name_or_path)))?;
         let mut warnings = Vec::new();
-        let (file, hand, notices) = checked(document, |file| hand(file, &mut warnings))?;
+        let (file, hand, notices) = checked(document, |file| file.prepare(&mut warnings))?;
         warnings.splice(0..0, notices.iter().map(Notice::to_string));
         Ok((file, hand, warnings))
+    }
+
+    /// Checks all that every hand needs, and prepares it. A firmware needs the table `[control]` as well.
+    pub(crate) fn prepare(&self, warnings: &mut Vec<String>) -> Result<Hand> {
+        if self.schema != SCHEMA {
+            return fail(
+                "schema",
+                format!("{} is a format that this program does not know", self.schema),
+                format!("write it as format {SCHEMA}"),
+            );
+        }
+        name("name", &self.name)?;
+        self.control.as_ref().map_or(Ok(()), control)?;
+        hand(self, warnings).map_err(as_of_hand)
+    }
+
+    /// The kinematics and masses, whatever size the numbers have: for those who look into what is wrong with a hand.
+    pub(crate) fn kinematics(&self) -> Result<Hand> {
+        kinematics(self).map_err(as_of_hand)
     }
 }
 
@@ -185,16 +194,18 @@ fn checked<T>(
     document: Document,
     check: impl FnOnce(&HandFile) -> Result<T>,
 ) -> Result<(HandFile, T, Vec<Notice>)> {
-    let mut notices = Vec::new();
-    let tree = document.complete_hand(&mut notices)?;
-    let file: HandFile = read(&tree, "")?;
-    let found = check(&file).map_err(|mut error| {
-        // The checks know the keys of a scene.
-        if let Some(key) = error.key.strip_prefix("hand.") {
-            error.key = key.into();
-        }
-        let place = tree.place_of(&error.key).clone();
+    let (file, places) = HandFile::from_document(document)?;
+    let found = check(&file).map_err(|error| {
+        let place = places.of(&error.key);
         error.at(&place)
     })?;
-    Ok((file, found, notices))
+    Ok((file, found, places.notices))
+}
+
+/// The checks know the keys of a scene.
+fn as_of_hand(mut error: SceneError) -> SceneError {
+    if let Some(key) = error.key.strip_prefix("hand.") {
+        error.key = key.into();
+    }
+    error
 }

@@ -38,13 +38,15 @@ use controller::Setup;
 use library::{Document, Kind};
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 use std::path::Path;
-use tree::Setting;
+use tree::{Node, Setting};
 
 pub(crate) use error::one_line;
 pub use error::{Notice, Place, SceneError, suggestion};
 pub use file::{Actuators, Control, Friction, HandFile, ObjectFile, PlantSettings, SceneFile, Sensors};
+pub(crate) use hand::{moving_masses, posture};
 pub use hand_model::HandModel;
 pub use object::ObjectBody;
+pub(crate) use object::breaks_triangle;
 pub use source::config_source;
 
 /// A scene, checked and ready for the simulator.
@@ -212,17 +214,38 @@ impl HandFile {
     /// # Errors
     /// What is wrong with the file as a file; a [`Scene`] checks the numbers.
     pub fn load(name_or_path: &str) -> Result<Self, SceneError> {
-        Self::load_with_notices(name_or_path).map(|(file, _)| file)
+        Self::load_with_places(name_or_path).map(|(file, _)| file)
     }
 
-    /// The same, with what is odd in the file and its URDF.
-    ///
-    /// # Errors
-    /// As [`Self::load`].
-    pub fn load_with_notices(name_or_path: &str) -> Result<(Self, Vec<Notice>), SceneError> {
+    /// The same, with where its values come from.
+    pub(crate) fn load_with_places(name_or_path: &str) -> Result<(Self, Places), SceneError> {
+        Self::from_document(open(Kind::Hand, name_or_path)?)
+    }
+
+    /// Reads a hand from a text; `source` is its name in places.
+    pub(crate) fn parse_with_places(text: &str, source: &str) -> Result<(Self, Places), SceneError> {
+        Self::from_document(Document::parse(text, source, Path::new(""))?)
+    }
+
+    fn from_document(document: Document) -> Result<(Self, Places), SceneError> {
         let mut notices = Vec::new();
-        let node = open(Kind::Hand, name_or_path)?.complete_hand(&mut notices)?;
-        Ok((read::read(&node, "")?, notices))
+        let tree = document.complete_hand(&mut notices)?;
+        Ok((read::read(&tree, "")?, Places { tree, notices }))
+    }
+}
+
+/// Where the values of a file come from, and what was odd on the way.
+#[derive(Clone, Debug)]
+pub(crate) struct Places {
+    tree: Node,
+    /// What is odd in the file, or in what it names.
+    pub(crate) notices: Vec<Notice>,
+}
+
+impl Places {
+    /// The place of a key, or that of the nearest thing around it.
+    pub(crate) fn of(&self, key: &str) -> Place {
+        self.tree.place_of(key).clone()
     }
 }
 
