@@ -46,7 +46,7 @@ impl Kind {
                 built_in!("scenes":
                     "prism" "cube" "prism-ideal" "cube-ideal" "cube-normal-only"
                     "hand-arm" "hand-arm-consistent" "hand-arm-firm"
-                    "two-finger-prism" "four-finger-cube" "allegro-like-prism"
+                    "l-bracket" "two-finger-prism" "four-finger-cube" "allegro-like-prism"
                 )
             }
             Self::Hand => {

@@ -35,7 +35,7 @@ pub(super) fn crossings(boxes: &Boxes, corners: &[[usize; 3]]) -> Crossings {
     Crossings { count, first, is_complete }
 }
 
-fn cross([a, b]: [usize; 2], boxes: &Boxes, corners: &[[usize; 3]]) -> bool {
+pub(super) fn cross([a, b]: [usize; 2], boxes: &Boxes, corners: &[[usize; 3]]) -> bool {
     pierces(a, b, boxes, corners) || pierces(b, a, boxes, corners)
 }
 

@@ -12,8 +12,8 @@ pub(super) fn describe(check: &ObjectCheck) -> String {
     body(check, &mut text);
     faces(check, &mut text);
     text += "\n";
-    for finding in check.findings.iter() {
-        let _ = writeln!(text, "{finding}");
+    for line in check.findings.lines() {
+        text = text + &line + "\n";
     }
     let _ = writeln!(text, "{}", check.findings.summary());
     text

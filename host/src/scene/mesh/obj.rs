@@ -5,7 +5,7 @@
 //! texture coordinates are not needed, and their indices would overflow it in a debug build. It would cut polygons into fans,
 //! which is wrong where they are not convex; so it leaves them whole, and they are cut here.
 
-use super::limits::{LONGEST_LINE, MAX_CORNERS, MAX_TRIANGLES, MOST_LOOKS};
+use super::limits::{COARSER, LONGEST_LINE, MAX_CORNERS, MAX_TRIANGLES, MOST_LOOKS};
 use super::polygon::triangles;
 use super::soup::{Problem, Soup};
 use nalgebra::Vector3;
@@ -112,9 +112,7 @@ fn without_colour(line: &[u8]) -> &[u8] {
 
 /// Before anything is kept: there may be billions.
 fn check_counts(bytes: &[u8]) -> Result<(), Problem> {
-    let fail = |what: String| {
-        Err(Problem::new(what, "export it with coarser tolerances: a grasp needs its faces, not its finish"))
-    };
+    let fail = |what: String| Err(Problem::new(what, COARSER));
     let (mut vertices, mut triangles) = (0, 0_usize);
     for (line, words) in bytes.split(|&byte| byte == b'\n').enumerate() {
         match kind(words) {

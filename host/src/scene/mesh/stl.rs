@@ -10,7 +10,7 @@
 //!   solids may be missing; several solids are read as one.
 //! - What is neither is a binary file that was cut off, or no STL file.
 
-use super::limits::{LONGEST_LINE, MAX_TRIANGLES};
+use super::limits::{COARSER, LONGEST_LINE, MAX_TRIANGLES};
 use super::soup::{Problem, Soup};
 use nalgebra::Vector3;
 use std::io::Cursor;
@@ -92,10 +92,7 @@ fn too_many(count: usize) -> Result<(), Problem> {
     if count <= MAX_TRIANGLES {
         return Ok(());
     }
-    Err(Problem::new(
-        format!("has {count} triangles: at most {MAX_TRIANGLES} are read"),
-        "export it with coarser tolerances: a grasp needs its faces, not its finish",
-    ))
+    Err(Problem::new(format!("has {count} triangles: at most {MAX_TRIANGLES} are read"), COARSER))
 }
 
 /// Lines with their numbers from 1. Where nothing else ends them, `\r` does, as it once did.

@@ -300,3 +300,23 @@ fn units_and_scales_give_metres() {
     );
     std::fs::remove_dir_all(&folder).unwrap();
 }
+
+/// On an inner side of the L, the wall beside it is near.
+#[test]
+fn a_fingertip_that_would_cut_into_a_wall_is_refused() {
+    let scene = |y_mm: f64| {
+        let x_mm = 28640.0 / 1520.0;
+        let point = format!("contact.2.point_m=[{}, {}, 0]", (20.0 - x_mm) / 1e3, (20.0 - x_mm + y_mm) / 1e3);
+        Scene::load("l-bracket", &["contact.2.face=5".to_owned(), point])
+    };
+    let message = scene(5.0).unwrap_err().to_string();
+    assert!(
+        message.ends_with(
+            "contact.2: fingertip `finger-2` would reach 10.000 mm into another part of the object than face 5; move the contact \
+             point away from what rises beside the face, or choose another face"
+        ),
+        "{message}"
+    );
+    // Farther away there is room; that the finger does not get there is another matter.
+    assert!(scene(16.0).is_ok_and(|_| true) || scene(16.0).unwrap_err().to_string().contains("stays"));
+}
