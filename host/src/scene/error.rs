@@ -21,6 +21,11 @@ impl Place {
     pub fn whole(source: &str) -> Self {
         Self { source: source.into(), line: 0 }
     }
+
+    /// Whether it is in a file, and not on the command line.
+    pub(super) fn is_in_a_file(&self) -> bool {
+        *self.source != *"--set"
+    }
 }
 
 impl fmt::Display for Place {
@@ -70,6 +75,24 @@ impl SceneError {
             line = line + "; " + &self.remedy;
         }
         one_line(&line)
+    }
+}
+
+/// What is odd in a file but can be used. One line: `file:line: what; remedy`.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Notice {
+    /// Where.
+    pub place: Place,
+    /// What is odd.
+    pub what: String,
+    /// What to do.
+    pub remedy: String,
+}
+
+impl fmt::Display for Notice {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { place, what, remedy } = self;
+        f.write_str(&one_line(&format!("{place}: {what}; {remedy}")))
     }
 }
 

@@ -5,16 +5,15 @@ use super::{
     build::control,
     check::{Result, fail, name},
     controller::Setup,
-    error::{Place, SceneError},
+    error::{Notice, Place, SceneError},
     file::{Actuators, HandFile, PlantSettings, SCHEMA, Sensors},
     hand::{hand, kinematics},
-    library::{Document, Kind, complete_hand},
-    read::read,
+    library::{Document, Kind, is_path},
     source::{IMPORTS, Source, config_source},
 };
 use crate::{Hand, MAX_JOINTS};
 use blindgrasp_shared::tick::{Config, Params};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// How long the host's heartbeat may fail while the hand has torque, ms.
 const HEARTBEAT_MS: u32 = 250;
@@ -65,14 +64,20 @@ impl HandModel {
         Self::from_document(Document::parse(text, source, Path::new(""))?).map(|(model, _)| model)
     }
 
+    /// The files on the disk that a hand is read from: its own, and its URDF. As far as they can be told; none for a hand
+    /// built in.
+    pub fn files(name_or_path: &str) -> Vec<PathBuf> {
+        if !is_path(name_or_path) {
+            return Vec::new();
+        }
+        let document = Document::open(Kind::Hand, name_or_path, Path::new(""));
+        let urdf = document.ok().and_then(|document| document.urdf_path());
+        std::iter::once(name_or_path.into()).chain(urdf).collect()
+    }
+
     fn from_document(document: Document) -> std::result::Result<(Self, HandFile), SceneError> {
-        let mut tree = document.node;
-        complete_hand(&mut tree);
-        let file: HandFile = read(&tree, "")?;
-        let model = Self::build(&file).map_err(|error| {
-            let place = tree.place_of(&error.key).clone();
-            error.at(&place)
-        })?;
+        let (file, mut model, notices) = checked(document, Self::build)?;
+        model.warnings.splice(0..0, notices.iter().map(Notice::to_string));
         Ok((model, file))
     }
 
@@ -150,6 +155,20 @@ pub static CONFIG: Config<f32, JOINTS> = {};
 }
 
 impl HandFile {
+    /// Loads a hand by its built-in name or by its path, checks it, and prepares its kinematics; with what is odd in it, in
+    /// words. Unlike a [`HandModel`], it may do without `[control]`.
+    ///
+    /// # Errors
+    /// One line: where, which key, what is wrong, what to do.
+    pub fn load_checked(name_or_path: &str) -> std::result::Result<(Self, Hand, Vec<String>), SceneError> {
+        let document = Document::open(Kind::Hand, name_or_path, Path::new(""));
+        let document = document.map_err(|error| error.at(&Place::whole(name_or_path)))?;
+        let mut warnings = Vec::new();
+        let (file, hand, notices) = checked(document, |file| file.prepare(&mut warnings))?;
+        warnings.splice(0..0, notices.iter().map(Notice::to_string));
+        Ok((file, hand, warnings))
+    }
+
     /// Checks all that every hand needs, and prepares it. A firmware needs the table `[control]` as well.
     pub(crate) fn prepare(&self, warnings: &mut Vec<String>) -> Result<Hand> {
         if self.schema != SCHEMA {
@@ -168,6 +187,19 @@ impl HandFile {
     pub(crate) fn kinematics(&self) -> Result<Hand> {
         kinematics(self).map_err(as_of_hand)
     }
+}
+
+/// Reads a hand and checks it; what is wrong gets its place.
+fn checked<T>(
+    document: Document,
+    check: impl FnOnce(&HandFile) -> Result<T>,
+) -> Result<(HandFile, T, Vec<Notice>)> {
+    let (file, places) = HandFile::from_document(document)?;
+    let found = check(&file).map_err(|error| {
+        let place = places.of(&error.key);
+        error.at(&place)
+    })?;
+    Ok((file, found, places.notices))
 }
 
 /// The checks know the keys of a scene.

@@ -24,6 +24,7 @@ mod start;
 #[cfg(test)]
 mod tests;
 mod tree;
+mod urdf;
 
 use crate::plant::contact::{FaceContact, FingertipModel};
 use crate::plant::friction::JointFriction;
@@ -39,7 +40,7 @@ use std::path::Path;
 use tree::{Node, Setting};
 
 pub(crate) use error::one_line;
-pub use error::{Place, SceneError, suggestion};
+pub use error::{Notice, Place, SceneError, suggestion};
 pub use file::{Actuators, Control, Friction, HandFile, ObjectFile, PlantSettings, SceneFile, Sensors};
 pub(crate) use hand::{moving_masses, posture};
 pub use hand_model::HandModel;
@@ -149,12 +150,15 @@ impl Scene {
 
     fn from_document(document: Document, settings: &[String]) -> Result<Self, SceneError> {
         let settings = settings.iter().map(|text| Setting::parse(text)).collect::<Result<Vec<_>, _>>()?;
-        let tree = document.complete_scene(&settings)?;
+        let mut notices = Vec::new();
+        let tree = document.complete_scene(&settings, &mut notices)?;
         let file = read::read(&tree, "")?;
-        build::scene(file).map_err(|error| {
+        let mut scene = build::scene(file).map_err(|error| {
             let place = tree.place_of(&error.key).clone();
             error.at(&place)
-        })
+        })?;
+        scene.warnings.splice(0..0, notices.iter().map(Notice::to_string));
+        Ok(scene)
     }
 
     /// Checks and prepares a scene that was put together in code.
@@ -198,6 +202,11 @@ impl Scene {
 }
 
 impl HandFile {
+    /// Names of the built-in hands.
+    pub fn built_in() -> impl Iterator<Item = &'static str> {
+        Kind::Hand.built_in().iter().map(|(name, _)| *name)
+    }
+
     /// Loads a hand by its built-in name or by its path.
     ///
     /// # Errors
@@ -217,20 +226,24 @@ impl HandFile {
     }
 
     fn from_document(document: Document) -> Result<(Self, Places), SceneError> {
-        let mut node = document.node;
-        library::complete_hand(&mut node);
-        Ok((read::read(&node, "")?, Places(node)))
+        let mut notices = Vec::new();
+        let tree = document.complete_hand(&mut notices)?;
+        Ok((read::read(&tree, "")?, Places { tree, notices }))
     }
 }
 
-/// Where the values of a file come from.
+/// Where the values of a file come from, and what was odd on the way.
 #[derive(Clone, Debug)]
-pub(crate) struct Places(Node);
+pub(crate) struct Places {
+    tree: Node,
+    /// What is odd in the file, or in what it names.
+    pub(crate) notices: Vec<Notice>,
+}
 
 impl Places {
     /// The place of a key, or that of the nearest thing around it.
     pub(crate) fn of(&self, key: &str) -> Place {
-        self.0.place_of(key).clone()
+        self.tree.place_of(key).clone()
     }
 }
 

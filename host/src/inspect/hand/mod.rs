@@ -17,7 +17,7 @@ mod structure;
 mod tests;
 mod text;
 
-use super::finding::{Counts, Findings, Verdict};
+use super::finding::{Counts, Finding, Findings, Severity, Verdict};
 use crate::scene::{HandFile, HandModel, Places, SceneError, moving_masses};
 use crate::{Hand, MAX_JOINTS};
 use found::Found;
@@ -98,6 +98,9 @@ impl HandCheck {
         findings.extend(found.findings.into_iter().map(|finding| {
             let place = places.of(&finding.key);
             finding.at(place)
+        }));
+        findings.extend(places.notices.iter().map(|notice| {
+            Finding::new(Severity::Notice, &notice.what, &notice.remedy).at(notice.place.clone())
         }));
         findings.sort();
         Self {
