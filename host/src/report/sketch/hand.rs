@@ -33,6 +33,16 @@ impl Part {
             Self::Rod { ends, .. } => (ends[0] + ends[1]) / 2.0,
         }
     }
+
+    /// Where it stands in the order from far to near, m: a ball counts from near its front, so that it covers the rods that
+    /// end in it.
+    fn nearness(&self, camera: &Camera) -> f64 {
+        let bulge = match self {
+            Self::Ball { radius_m, .. } => 0.8 * radius_m,
+            Self::Rod { .. } => 0.0,
+        };
+        camera.view.back.dot(&self.middle()) + bulge
+    }
 }
 
 /// A flat disc: the plate of a palm, or the foot of an arm.
@@ -197,9 +207,8 @@ fn across(from: [f64; 2], to: [f64; 2], width: f64) -> Option<[f64; 2]> {
 
 /// Draws parts from far to near; a plate before what is in front of its plane, after what is behind.
 fn paint(svg: &mut Svg, camera: &Camera, plates: &[Plate], mut parts: Vec<Part>) {
-    let depth = |point: &Vector3<f64>| camera.view.back.dot(point);
     let Some((plate, others)) = plates.split_first() else {
-        parts.sort_by(|a, b| depth(&a.middle()).total_cmp(&depth(&b.middle())));
+        parts.sort_by(|a, b| a.nearness(camera).total_cmp(&b.nearness(camera)));
         parts.iter().for_each(|part| draw(svg, camera, part));
         return;
     };

@@ -70,6 +70,24 @@ fn hands_of_any_size_can_be_drawn() {
     assert!(svg.contains(" m</text>"), "the scale bar is in metres");
 }
 
+/// Writes pictures of everything that is built in to a folder, to be looked at: `PICTURES=DIR cargo test ... -- --ignored`.
+#[test]
+#[ignore = "writes files to be looked at"]
+fn pictures_to_look_at() {
+    let folder = std::env::var("PICTURES").unwrap();
+    for name in crate::scene::HandFile::built_in() {
+        std::fs::write(format!("{folder}/{name}.svg"), shipped(name)).unwrap();
+    }
+    for scene in ["cube", "prism", "two-finger-prism"] {
+        let scene = crate::scene::Scene::load(scene, &[]).unwrap();
+        std::fs::write(
+            format!("{folder}/{}.svg", scene.object_name),
+            object_svg(&scene.object, &scene.object_name),
+        )
+        .unwrap();
+    }
+}
+
 #[test]
 fn faces_are_numbered_once() {
     let cube = Polyhedron::cuboid([0.048, 0.03, 0.02]).unwrap();
