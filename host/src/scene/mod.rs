@@ -204,6 +204,11 @@ impl HandFile {
         library::complete_hand(&mut node);
         read::read(&node, "")
     }
+
+    /// Names of the built-in hands.
+    pub fn built_in() -> impl Iterator<Item = &'static str> {
+        Kind::Hand.built_in().iter().map(|(name, _)| *name)
+    }
 }
 
 impl ObjectFile {
