@@ -302,10 +302,15 @@ fn references_are_relative_to_the_file() {
         load(&a_folder, &[]).unwrap_err().to_string(),
         format!("{a_folder}: not a file; name a .toml file")
     );
-    let large = write("large.toml", &vec![b'#'; 5 << 20]);
+    let large = write("large.toml", &vec![b'#'; 33 << 20]);
     assert_eq!(
         load(&large, &[]).unwrap_err().to_string(),
-        format!("{large}: 5 MiB are too many; check the path")
+        format!("{large}: 33 MiB are too many; check the path")
+    );
+    let many = write("many.toml", &vec![b','; 2_000_001]);
+    assert_eq!(
+        load(&many, &[]).unwrap_err().to_string(),
+        format!("{many}: 2000001 values are too many; check the path")
     );
     let windows = write("windows.toml", text("cube").replace('\n', "\r\n").as_bytes());
     assert_eq!(load(&windows, &[]).map(|scene| scene.name), Ok("cube".into()));

@@ -213,7 +213,7 @@ fn errors_in_hands_and_objects_name_their_file() {
         ("object.shape.box.sze=1", "--set: object.shape.box.sze: unknown key; did you mean `size_m`?"),
         (
             "object.shape.prsm.side_m=1",
-            "objects/cube.toml:8: object.shape: has 2 keys; give one of box, prism, polygon_prism, hull",
+            "objects/cube.toml:8: object.shape: has 2 keys; give one of box, prism, polygon_prism, hull, pyramid, mesh",
         ),
         (
             "object.shape={pyramid = {}}",
