@@ -38,10 +38,16 @@ impl Kind {
     pub(super) fn built_in(self) -> &'static [(&'static str, &'static str)] {
         match self {
             Self::Scene => {
-                built_in!("scenes": "prism" "cube" "prism-ideal" "cube-ideal" "cube-normal-only" "two-finger-prism")
+                built_in!("scenes":
+                    "prism" "cube" "prism-ideal" "cube-ideal" "cube-normal-only"
+                    "hand-arm" "hand-arm-consistent" "hand-arm-firm"
+                    "two-finger-prism" "four-finger-cube" "allegro-like-prism"
+                )
             }
-            Self::Hand => built_in!("hands": "three-finger" "two-finger"),
-            Self::Object => built_in!("objects": "prism" "cube" "hexagonal-prism"),
+            Self::Hand => {
+                built_in!("hands": "three-finger" "hand-arm" "two-finger" "four-finger" "allegro-like")
+            }
+            Self::Object => built_in!("objects": "prism" "cube" "hexagonal-prism" "cuboid" "cuboid-printed"),
         }
     }
 }
