@@ -96,6 +96,16 @@ fn json_is_one_object_with_every_field() {
 }
 
 #[test]
+fn the_help_names_every_built_in_scene() {
+    let output = blindgrasp(&["sim", "--help"]);
+    assert_eq!(output.status.code(), Some(0));
+    let help = text(&output.stdout);
+    for name in blindgrasp::scene::Scene::built_in() {
+        assert!(help.contains(name), "no `{name}` in: {help}");
+    }
+}
+
+#[test]
 fn exit_code_says_whether_the_grasp_held() {
     let held = blindgrasp(&["sim", "cube"]);
     assert_eq!(held.status.code(), Some(0));
