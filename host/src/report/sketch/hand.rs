@@ -292,7 +292,7 @@ fn axis(svg: &mut Svg, camera: &Camera, posture: &Posture, joint: usize, sizes: 
     let pose = posture.link(joint);
     let (from, axis) = (flat(camera, &pose.origin_m), pose.axis());
     // Long enough to stand out of the joint, and to be seen.
-    let length = (2.4 * sizes.joint_radius_m * camera.pixels_per_m).max(22.0);
+    let length = (1.9 * sizes.joint_radius_m * camera.pixels_per_m).max(20.0);
     let [x, y] = camera.view.flat(&axis);
     let label = format!("{}", joint + 1);
     let place = if x * x + y * y > 0.04 {
