@@ -27,6 +27,7 @@ enum Command {
     Serve(commands::serve::Arguments),
     Replay(commands::replay::Arguments),
     Export(commands::export::Arguments),
+    Object(commands::object::Arguments),
 }
 
 fn main() -> ExitCode {
@@ -42,6 +43,7 @@ fn main() -> ExitCode {
         Command::Serve(arguments) => commands::serve::run(&arguments),
         Command::Replay(arguments) => commands::replay::run(&arguments),
         Command::Export(arguments) => commands::export::run(&arguments),
+        Command::Object(arguments) => commands::object::run(&arguments),
     };
     match outcome {
         Ok(commands::Outcome::Shown) => ExitCode::SUCCESS,

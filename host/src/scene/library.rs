@@ -2,6 +2,7 @@
 
 use super::{
     error::{Notice, Place, SceneError, suggestion},
+    mesh,
     tree::{Node, Setting, Value},
     urdf,
 };
@@ -10,6 +11,10 @@ use std::path::{Path, PathBuf};
 
 /// No file of ours comes close; something else was named by mistake.
 const LARGEST_FILE: u64 = 4 << 20;
+/// No scene or object comes close, but for one with a mesh written into it.
+const LARGEST_TOML: u64 = 32 << 20;
+/// Values of a file, roughly: the largest mesh has 1.2 million. Each takes some hundred bytes while the file is read.
+const MOST_VALUES: usize = 2_000_000;
 
 /// What a file describes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -41,13 +46,17 @@ impl Kind {
                 built_in!("scenes":
                     "prism" "cube" "prism-ideal" "cube-ideal" "cube-normal-only"
                     "hand-arm" "hand-arm-consistent" "hand-arm-firm"
-                    "two-finger-prism" "four-finger-cube" "allegro-like-prism"
+                    "l-bracket" "two-finger-prism" "four-finger-cube" "allegro-like-prism"
                 )
             }
             Self::Hand => {
                 built_in!("hands": "three-finger" "hand-arm" "two-finger" "four-finger" "allegro-like")
             }
-            Self::Object => built_in!("objects": "prism" "cube" "hexagonal-prism" "cuboid" "cuboid-printed"),
+            Self::Object => {
+                built_in!("objects":
+                    "prism" "cube" "hexagonal-prism" "cuboid" "cuboid-printed" "l-bracket" "octahedron"
+                )
+            }
         }
     }
 }
@@ -56,6 +65,12 @@ impl Kind {
 const BUILT_IN_URDFS: &[(&str, &str)] = &[
     #[cfg(test)]
     ("gripper.urdf", include_str!("urdf/tests/gripper.urdf")),
+];
+
+/// Mesh files that objects built in name, by their names.
+const BUILT_IN_MESHES: &[(&str, &[u8])] = &[
+    ("l-bracket.stl", include_bytes!("../../../models/objects/l-bracket.stl")),
+    ("octahedron.obj", include_bytes!("../../../models/objects/octahedron.obj")),
 ];
 
 /// What the references of a file are relative to.
@@ -89,6 +104,22 @@ impl Home {
         }
         let path = self.resolve(file, named_at);
         Ok((read_text(&path, ".urdf")?.into(), path.to_string_lossy().into_owned()))
+    }
+
+    /// The bytes of the mesh file that an object names.
+    pub(super) fn mesh(
+        &self,
+        file: &str,
+        named_at: &Place,
+        largest: u64,
+    ) -> Result<Cow<'static, [u8]>, SceneError> {
+        if let (Self::BuiltIn, true) = (self, named_at.is_in_a_file()) {
+            return match BUILT_IN_MESHES.iter().find(|(name, _)| *name == file) {
+                Some((_, bytes)) => Ok(Cow::Borrowed(bytes)),
+                None => Err(SceneError::new("", "is not built in", "name it by its path")),
+            };
+        }
+        read_bytes(&self.resolve(file, named_at), ".stl or .obj", largest).map(Cow::Owned)
     }
 
     /// The path of a file that is named somewhere.
@@ -138,8 +169,8 @@ impl Document {
         }
     }
 
-    /// Applies settings, follows the references of a scene, and fills in the URDF and the defaults of its hand. Settings of
-    /// what a reference names come before it is followed, all others after.
+    /// Applies settings, follows the references of a scene, and fills in the URDF and the defaults of its hand and the mesh
+    /// of its object. Settings of what a reference names come before it is followed, all others after; the mesh comes last.
     pub(super) fn complete_scene(
         mut self,
         settings: &[Setting],
@@ -150,6 +181,7 @@ impl Document {
         for setting in settings.iter().filter(is_reference) {
             self.node.set(setting)?;
         }
+        let mut object_home = self.home.clone();
         for (key, kind) in [("hand", Kind::Hand), ("object", Kind::Object)] {
             let Some(node) = self.node.get_mut(key) else { continue };
             let mut home = self.home.clone();
@@ -165,6 +197,8 @@ impl Document {
                 }
                 let Some(hand) = self.node.get_mut(key) else { continue };
                 complete_hand(hand, &home, notices).map_err(|error| error.below(key))?;
+            } else {
+                object_home = home;
             }
         }
         for setting in settings.iter().filter(|setting| !is_reference(setting) && !is_of_urdf(setting)) {
@@ -174,7 +208,17 @@ impl Document {
             }
             self.node.set(setting)?;
         }
+        if let Some(object) = self.node.get_mut("object") {
+            mesh::expand(object, &object_home, notices).map_err(|error| error.below("object"))?;
+        }
         Ok(self.node)
+    }
+
+    /// An object's tree, with its mesh filled in.
+    pub(super) fn complete_object(self, notices: &mut Vec<Notice>) -> Result<Node, SceneError> {
+        let Self { mut node, home } = self;
+        mesh::expand(&mut node, &home, notices)?;
+        Ok(node)
     }
 
     /// A hand's tree, with its URDF and its defaults filled in.
@@ -208,8 +252,24 @@ fn complete_hand(node: &mut Node, home: &Home, notices: &mut Vec<Notice>) -> Res
     Ok(())
 }
 
-/// Reads a file of a kind.
+/// Reads a text file of a kind.
 fn read_text(path: &Path, ending: &str) -> Result<String, SceneError> {
+    let place = Place::whole(&path.to_string_lossy());
+    let bytes = read_bytes(path, ending, if ending == ".toml" { LARGEST_TOML } else { LARGEST_FILE })?;
+    let values = bytes.iter().filter(|&&byte| byte == b',' || byte == b'\n').count();
+    if values > MOST_VALUES {
+        let problem = format!("{values} values are too many");
+        return Err(SceneError::new("", problem, "check the path").at(&place));
+    }
+    String::from_utf8(bytes).map_err(|error| {
+        let valid = &error.as_bytes()[..error.utf8_error().valid_up_to()];
+        let line = 1 + valid.iter().filter(|&&byte| byte == b'\n').count();
+        SceneError::new("", "not UTF-8 text", "save it as UTF-8").at(&Place { line, ..place })
+    })
+}
+
+/// Reads a file of a kind.
+fn read_bytes(path: &Path, ending: &str, largest: u64) -> Result<Vec<u8>, SceneError> {
     let place = Place::whole(&path.to_string_lossy());
     let fail = |problem: String, remedy: &str| SceneError::new("", problem, remedy).at(&place);
     let unreadable = |error: std::io::Error| {
@@ -224,17 +284,10 @@ fn read_text(path: &Path, ending: &str) -> Result<String, SceneError> {
     if !metadata.is_file() {
         return Err(fail("not a file".into(), &format!("name a {ending} file")));
     }
-    if metadata.len() > LARGEST_FILE {
+    if metadata.len() > largest {
         return Err(fail(format!("{} MiB are too many", metadata.len() >> 20), "check the path"));
     }
-    let bytes = std::fs::read(path).map_err(unreadable)?;
-    String::from_utf8(bytes).map_err(|error| {
-        let line = 1 + error.as_bytes()[..error.utf8_error().valid_up_to()]
-            .iter()
-            .filter(|&&byte| byte == b'\n')
-            .count();
-        fail("not UTF-8 text".into(), "save it as UTF-8").at_line(line)
-    })
+    std::fs::read(path).map_err(unreadable)
 }
 
 impl SceneError {
@@ -252,13 +305,6 @@ impl SceneError {
     fn below(mut self, key: &str) -> Self {
         if !self.key.is_empty() {
             self.key = format!("{key}.{}", self.key);
-        }
-        self
-    }
-
-    fn at_line(mut self, line: usize) -> Self {
-        if let Some(place) = &mut self.place {
-            place.line = line;
         }
         self
     }

@@ -16,6 +16,7 @@ pub mod file;
 mod hand;
 mod hand_model;
 mod library;
+pub mod mesh;
 mod object;
 pub mod placement;
 mod read;
@@ -44,6 +45,7 @@ pub use error::{Notice, Place, SceneError, suggestion};
 pub use file::{Actuators, Control, Friction, HandFile, ObjectFile, PlantSettings, SceneFile, Sensors};
 pub(crate) use hand::{moving_masses, posture};
 pub use hand_model::HandModel;
+pub use object::ObjectBody;
 pub(crate) use object::breaks_triangle;
 pub use source::config_source;
 
@@ -245,6 +247,11 @@ impl Places {
     pub(crate) fn of(&self, key: &str) -> Place {
         self.tree.place_of(key).clone()
     }
+
+    /// Names of the built-in hands.
+    pub fn built_in() -> impl Iterator<Item = &'static str> {
+        Kind::Hand.built_in().iter().map(|(name, _)| *name)
+    }
 }
 
 impl ObjectFile {
@@ -253,7 +260,25 @@ impl ObjectFile {
     /// # Errors
     /// What is wrong with the file as a file; a [`Scene`] checks the numbers.
     pub fn load(name_or_path: &str) -> Result<Self, SceneError> {
-        read::read(&open(Kind::Object, name_or_path)?.node, "")
+        Self::load_with_notices(name_or_path).map(|(file, _)| file)
+    }
+
+    /// Reads an object from a text. `source` is its name in errors; its mesh is relative to `folder`.
+    ///
+    /// # Errors
+    /// As [`Self::load`].
+    pub fn parse(text: &str, source: &str, folder: &Path) -> Result<Self, SceneError> {
+        read::read(&Document::parse(text, source, folder)?.complete_object(&mut Vec::new())?, "")
+    }
+
+    /// As [`Self::load`], with what its mesh was repaired of.
+    ///
+    /// # Errors
+    /// As [`Self::load`].
+    pub fn load_with_notices(name_or_path: &str) -> Result<(Self, Vec<Notice>), SceneError> {
+        let mut notices = Vec::new();
+        let node = open(Kind::Object, name_or_path)?.complete_object(&mut notices)?;
+        Ok((read::read(&node, "")?, notices))
     }
 }
 
