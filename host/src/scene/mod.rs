@@ -247,11 +247,6 @@ impl Places {
     pub(crate) fn of(&self, key: &str) -> Place {
         self.tree.place_of(key).clone()
     }
-
-    /// Names of the built-in hands.
-    pub fn built_in() -> impl Iterator<Item = &'static str> {
-        Kind::Hand.built_in().iter().map(|(name, _)| *name)
-    }
 }
 
 impl ObjectFile {
