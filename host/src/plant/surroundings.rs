@@ -23,7 +23,8 @@ impl Surroundings {
 
     /// Whether a sphere (object frame) has come to any of it.
     pub(super) fn reach(&mut self, centre_m: &Vector3<f64>, radius_m: f64) -> bool {
-        if self.obstacles.is_empty() || (centre_m - self.looked_from_m).norm_squared() < self.room_m.powi(2) {
+        let moved_squared = (centre_m - self.looked_from_m).norm_squared();
+        if self.obstacles.is_empty() || (self.room_m > 0.0 && moved_squared < self.room_m * self.room_m) {
             return false;
         }
         (self.looked_from_m, self.room_m) = (*centre_m, self.obstacles.distance_m(centre_m) - radius_m);

@@ -4,9 +4,11 @@ use super::super::Outcome;
 use anyhow::Context;
 use blindgrasp::inspect::finding::Verdict;
 use blindgrasp::inspect::object::{ObjectCheck, Wanted};
+use blindgrasp::report;
 use blindgrasp::scene::mesh::Unit;
 use clap::Args;
 use std::io::{self, Write as _};
+use std::path::PathBuf;
 
 /// Show what an object is (volume, mass, faces with the room on them) and find what is wrong with it
 ///
@@ -27,6 +29,9 @@ pub(crate) struct Arguments {
     /// Print everything as one JSON object
     #[arg(long)]
     json: bool,
+    /// Draw the object with the numbers of its faces and write the picture (SVG) to this file, which is replaced
+    #[arg(long, value_name = "FILE.svg")]
+    picture: Option<PathBuf>,
 }
 
 /// Runs the command.
@@ -39,5 +44,15 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
     let check = ObjectCheck::load(&arguments.file, &wanted)?;
     let text = if arguments.json { serde_json::to_string(&check)? + "\n" } else { check.text() };
     io::stdout().lock().write_all(text.as_bytes()).context("cannot print the findings")?;
+    if let Some(path) = &arguments.picture {
+        match &check.shape {
+            Some(shape) => {
+                let svg = report::object_svg(shape, &check.name);
+                std::fs::write(path, svg).with_context(|| format!("cannot write {}", path.display()))?;
+                eprintln!("blindgrasp: wrote {}", path.display());
+            }
+            None => eprintln!("blindgrasp: no picture: it is no body; mend the errors first"),
+        }
+    }
     Ok(if check.verdict == Verdict::Broken { Outcome::Failed } else { Outcome::Shown })
 }

@@ -1,9 +1,10 @@
 //! Whether a surface cuts through itself.
 //!
-//! Two triangles cross when an edge of one passes through the inside of the other: the ends of the edge lie on different sides
-//! of the triangle, and the line through them passes all of its sides on the same hand. Which side a point is on is told by an
-//! exact predicate (Shewchuk's), so that what only touches (neighbours, parts that lie on one another) is never taken for a
-//! crossing, and no crossing is missed by rounding.
+//! Two triangles cross when an edge of one passes through the other: the ends of the edge lie on different sides of its plane,
+//! and the line through them passes none of its sides on the wrong hand. Which side a point is on is told by an exact
+//! predicate (Shewchuk's), so that rounding neither makes a crossing nor hides one. An edge may pass exactly through a side or a
+//! corner of the other triangle, which happens where parts are symmetric; not so where the two have a corner in common, since
+//! a sliver's edge may well run through its own corner. Parts that lie on one another in one plane are not found.
 
 use super::boxes::Boxes;
 use nalgebra::Vector3;
@@ -39,9 +40,10 @@ pub(super) fn cross([a, b]: [usize; 2], boxes: &Boxes, corners: &[[usize; 3]]) -
     pierces(a, b, boxes, corners) || pierces(b, a, boxes, corners)
 }
 
-/// Whether an edge of one triangle passes through the inside of the other. An edge that ends in a corner of the other does not.
+/// Whether an edge of one triangle passes through the other. An edge that ends in a corner of the other does not.
 fn pierces(one: usize, other: usize, boxes: &Boxes, corners: &[[usize; 3]]) -> bool {
     let plane = &boxes.triangles[other];
+    let are_neighbours = corners[one].iter().any(|k| corners[other].contains(k));
     (0..3).map(|k| (k, (k + 1) % 3)).any(|(from, to)| {
         let shared = |k: usize| corners[other].contains(&corners[one][k]);
         if shared(from) || shared(to) {
@@ -54,29 +56,15 @@ fn pierces(one: usize, other: usize, boxes: &Boxes, corners: &[[usize; 3]]) -> b
             return false;
         }
         let hands = [side(p, q, a, b), side(p, q, b, c), side(p, q, c, a)];
-        hands.iter().all(|hand| *hand > 0.0) || hands.iter().all(|hand| *hand < 0.0)
+        let on_one = |hand: f64| hands.iter().all(|h| h * hand > 0.0 || (*h == 0.0 && !are_neighbours));
+        on_one(1.0) || on_one(-1.0)
     })
 }
 
-/// On which side of the plane through three points a fourth lies; 0 on it, and nowhere else.
+/// On which side of the plane through three points a fourth lies: 1 or -1, and 0 on it and nowhere else.
 fn side(a: &Vector3<f64>, b: &Vector3<f64>, c: &Vector3<f64>, d: &Vector3<f64>) -> f64 {
     let [a, b, c, d] = [a, b, c, d].map(|p| Coord3D { x: p.x, y: p.y, z: p.z });
-    orient3d(a, b, c, d).signum_or_zero()
-}
-
-trait Sign {
-    fn signum_or_zero(self) -> Self;
-}
-
-impl Sign for f64 {
-    /// The product of two tiny numbers may be zero.
-    fn signum_or_zero(self) -> f64 {
-        if self > 0.0 {
-            1.0
-        } else if self < 0.0 {
-            -1.0
-        } else {
-            0.0
-        }
-    }
+    let volume = orient3d(a, b, c, d);
+    // Not the volume itself: the product of two tiny ones may be zero.
+    if volume == 0.0 { 0.0 } else { volume.signum() }
 }

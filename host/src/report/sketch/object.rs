@@ -80,8 +80,9 @@ fn draw_view(svg: &mut Svg, index: usize, view: View, object: &Polyhedron, exten
 
 /// The outlines of a face in the picture.
 fn outlines(object: &Polyhedron, face: &Face, camera: &Camera) -> Vec<Vec<[f64; 2]>> {
-    let loops = std::iter::once(&face.corners).chain(&face.holes);
-    loops.map(|corners| corners.iter().map(|&k| flat(camera, &object.vertices_m[k])).collect()).collect()
+    face.outlines()
+        .map(|corners| corners.iter().map(|&k| flat(camera, &object.vertices_m[k])).collect())
+        .collect()
 }
 
 /// The faces that look at the viewer, so that none comes before one that it covers: one that lies behind another's plane is

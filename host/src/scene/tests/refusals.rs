@@ -216,8 +216,8 @@ fn errors_in_hands_and_objects_name_their_file() {
             "objects/cube.toml:8: object.shape: has 2 keys; give one of box, prism, polygon_prism, hull, pyramid, mesh",
         ),
         (
-            "object.shape={pyramid = {}}",
-            "--set: object.shape.pyramid: `pyramid` is unknown; known: box, prism, polygon_prism, hull",
+            "object.shape={cylinder = {}}",
+            "--set: object.shape.cylinder: `cylinder` is unknown; known: box, prism, polygon_prism, hull, pyramid, mesh",
         ),
         (
             "object.shape={hull={points_m=[[0,0,0],[1,0,0],[0,1,0],[1,1,0]]}}",
