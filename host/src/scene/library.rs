@@ -209,7 +209,7 @@ fn complete_hand(node: &mut Node, home: &Home, notices: &mut Vec<Notice>) -> Res
 }
 
 /// Reads a file of a kind.
-fn read_text(path: &Path, ending: &str) -> Result<String, SceneError> {
+pub(super) fn read_text(path: &Path, ending: &str) -> Result<String, SceneError> {
     let place = Place::whole(&path.to_string_lossy());
     let fail = |problem: String, remedy: &str| SceneError::new("", problem, remedy).at(&place);
     let unreadable = |error: std::io::Error| {

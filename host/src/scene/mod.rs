@@ -43,6 +43,7 @@ pub use error::{Notice, Place, SceneError, suggestion};
 pub use file::{Actuators, Control, Friction, HandFile, ObjectFile, PlantSettings, SceneFile, Sensors};
 pub use hand_model::HandModel;
 pub use source::config_source;
+pub use urdf::{FingertipRequest, Starter, StarterRequest};
 
 /// A scene, checked and ready for the simulator.
 #[derive(Clone, Debug, PartialEq)]

@@ -1,11 +1,12 @@
 //! `blindgrasp hand`: hands as files.
 
 mod export;
+mod new;
 
 use super::Outcome;
 use clap::{Args, Subcommand};
 
-/// Hands: write a URDF of one
+/// Hands: start one from a URDF, write one as a URDF
 #[derive(Args)]
 #[command(arg_required_else_help = true)]
 pub(crate) struct Arguments {
@@ -15,12 +16,14 @@ pub(crate) struct Arguments {
 
 #[derive(Subcommand)]
 enum Action {
+    New(new::Arguments),
     Export(export::Arguments),
 }
 
 /// Runs the command.
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
     match &arguments.action {
+        Action::New(arguments) => new::run(arguments),
         Action::Export(arguments) => export::run(arguments),
     }
 }
