@@ -18,6 +18,7 @@ struct Cli {
 enum Command {
     Sim(commands::sim::Arguments),
     Hand(commands::hand::Arguments),
+    Object(commands::object::Arguments),
     Pil(commands::pil::Arguments),
     Flash(commands::flash::Arguments),
     Console(commands::console::Arguments),
@@ -27,13 +28,13 @@ enum Command {
     Serve(commands::serve::Arguments),
     Replay(commands::replay::Arguments),
     Export(commands::export::Arguments),
-    Object(commands::object::Arguments),
 }
 
 fn main() -> ExitCode {
     let outcome = match Cli::parse().command {
         Command::Sim(arguments) => commands::sim::run(&arguments),
         Command::Hand(arguments) => commands::hand::run(&arguments),
+        Command::Object(arguments) => commands::object::run(&arguments),
         Command::Pil(arguments) => commands::pil::run(&arguments),
         Command::Flash(arguments) => commands::flash::run(&arguments),
         Command::Console(arguments) => commands::console::run(&arguments),
@@ -43,7 +44,6 @@ fn main() -> ExitCode {
         Command::Serve(arguments) => commands::serve::run(&arguments),
         Command::Replay(arguments) => commands::replay::run(&arguments),
         Command::Export(arguments) => commands::export::run(&arguments),
-        Command::Object(arguments) => commands::object::run(&arguments),
     };
     match outcome {
         Ok(commands::Outcome::Shown) => ExitCode::SUCCESS,

@@ -75,7 +75,8 @@ impl HandModel {
         std::iter::once(name_or_path.into()).chain(urdf).collect()
     }
 
-    fn from_document(document: Document) -> std::result::Result<(Self, HandFile), SceneError> {
+    /// Of a hand's file, with all that it says.
+    pub(super) fn from_document(document: Document) -> std::result::Result<(Self, HandFile), SceneError> {
         let (file, mut model, notices) = checked(document, Self::build)?;
         model.warnings.splice(0..0, notices.iter().map(Notice::to_string));
         Ok((model, file))

@@ -253,7 +253,7 @@ fn complete_hand(node: &mut Node, home: &Home, notices: &mut Vec<Notice>) -> Res
 }
 
 /// Reads a text file of a kind.
-fn read_text(path: &Path, ending: &str) -> Result<String, SceneError> {
+pub(super) fn read_text(path: &Path, ending: &str) -> Result<String, SceneError> {
     let place = Place::whole(&path.to_string_lossy());
     let bytes = read_bytes(path, ending, if ending == ".toml" { LARGEST_TOML } else { LARGEST_FILE })?;
     let values = bytes.iter().filter(|&&byte| byte == b',' || byte == b'\n').count();

@@ -48,6 +48,7 @@ pub use hand_model::HandModel;
 pub use object::ObjectBody;
 pub(crate) use object::breaks_triangle;
 pub use source::config_source;
+pub use urdf::{FingertipRequest, Starter, StarterRequest};
 
 /// A scene, checked and ready for the simulator.
 #[derive(Clone, Debug, PartialEq)]

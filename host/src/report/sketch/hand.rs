@@ -188,7 +188,7 @@ fn rod(
     let (from, to) = (flat(camera, &ends[0]), flat(camera, &ends[1]));
     let Some(side) = across(from, to, radius_m * camera.pixels_per_m) else { return };
     let fill = svg.rod_fill(from, side, colour);
-    let pieces = (length / radius_m.max(1e-3 * length)).ceil().min(PIECES).max(1.0) as usize;
+    let pieces = (length / radius_m.max(1e-3 * length)).ceil().clamp(1.0, PIECES) as usize;
     let at = |k: usize| ends[0] + (ends[1] - ends[0]) * (k as f64 / pieces as f64);
     parts.extend((0..pieces).map(|k| Part::Rod {
         ends: [at(k), at(k + 1)],
@@ -268,7 +268,7 @@ fn draw_plate(svg: &mut Svg, camera: &Camera, plate: &Plate) {
     let (near, far) = if faces { (face, rear) } else { (rear, face) };
     // The side between the rims: each strip that is not hidden by the disc.
     let side = hex(toward(PALM, 0.0, 0.22));
-    svg.shape(&[far.clone()], &side, EDGE, 0.9);
+    svg.shape(std::slice::from_ref(&far), &side, EDGE, 0.9);
     for k in 0..near.len() {
         let next = (k + 1) % near.len();
         svg.fill(&[near[k], near[next], far[next], far[k]], &side);
@@ -292,7 +292,7 @@ fn axis(svg: &mut Svg, camera: &Camera, posture: &Posture, joint: usize, sizes: 
     let pose = posture.link(joint);
     let (from, axis) = (flat(camera, &pose.origin_m), pose.axis());
     // Long enough to stand out of the joint, and to be seen.
-    let length = (2.4 * sizes.joint_radius_m * camera.pixels_per_m).max(22.0);
+    let length = (1.9 * sizes.joint_radius_m * camera.pixels_per_m).max(20.0);
     let [x, y] = camera.view.flat(&axis);
     let label = format!("{}", joint + 1);
     let place = if x * x + y * y > 0.04 {

@@ -78,7 +78,7 @@ fn pictures_to_look_at() {
     for name in crate::scene::HandFile::built_in() {
         std::fs::write(format!("{folder}/{name}.svg"), shipped(name)).unwrap();
     }
-    for scene in ["cube", "prism", "two-finger-prism"] {
+    for scene in ["cube", "prism", "two-finger-prism", "l-bracket"] {
         let scene = crate::scene::Scene::load(scene, &[]).unwrap();
         std::fs::write(
             format!("{folder}/{}.svg", scene.object_name),
@@ -98,6 +98,12 @@ fn faces_are_numbered_once() {
         assert_eq!(count(&svg, &format!(">{face}</text>")), 1, "{face}");
     }
     assert!(svg.contains("48.0 x 30.0 x 20.0 mm"));
+    // Notches and holes are none of the face: of the bracket's faces, each shows somewhere.
+    let bracket = crate::scene::Scene::load("l-bracket", &[]).unwrap().object;
+    let svg = object_svg(&bracket, "l-bracket");
+    assert_sound(&svg);
+    let shown = (0..bracket.faces.len()).filter(|face| svg.contains(&format!(">{face}</text>"))).count();
+    assert!(shown + 1 >= bracket.faces.len(), "{shown} of {}", bracket.faces.len());
     for sides in [3, 6, 40] {
         let prism = Polyhedron::regular_prism(sides, 0.01, 0.05).unwrap();
         let svg = object_svg(&prism, "prism");

@@ -61,39 +61,58 @@ impl Assembly {
         fingertips: &[usize],
         notices: &mut Vec<Notice>,
     ) -> Result<Self> {
-        let base = base(robot, tree, keys)?;
-        let held = held(robot, keys)?;
         let mut moves_fingertip = vec![false; robot.joints.len()];
         for &link in fingertips {
             tree.above(link, robot).for_each(|joint| moves_fingertip[joint] = true);
         }
-        let is_free =
-            |k: usize| robot.joints[k].kind != Kind::Fixed && !held.contains_key(&k) && moves_fingertip[k];
-        let below = tree.below(base, robot);
-        let free: Vec<usize> =
-            below.iter().skip(1).filter_map(|&link| tree.carrier[link]).filter(|&k| is_free(k)).collect();
-        refuse_unfit(robot, &free)?;
+        let assembly = Self::put_together(robot, tree, keys, |k| moves_fingertip[k])?;
+        refuse_unfit(robot, &assembly.joints)?;
+        let held = held(robot, keys)?;
+        let is_idle = |k: &usize| {
+            robot.joints[*k].kind != Kind::Fixed
+                && !moves_fingertip[*k]
+                && !held.contains_key(k)
+                && assembly.seats[robot.joints[*k].parent].is_some()
+        };
+        let idle: Vec<usize> = (0..robot.joints.len()).filter(is_idle).collect();
+        notices.extend(tell_idle(robot, &idle));
+        Ok(assembly)
+    }
 
+    /// The same with every joint that is not to be held still, of whatever kind.
+    ///
+    /// # Errors
+    /// A base or a joint to hold still that is not there.
+    pub(super) fn of_all(robot: &Robot, tree: &Tree, keys: &Keys) -> Result<Self> {
+        Self::put_together(robot, tree, keys, |_| true)
+    }
+
+    /// Of the joints that are neither fixed nor to be held still, those move that are to.
+    fn put_together(
+        robot: &Robot,
+        tree: &Tree,
+        keys: &Keys,
+        is_to_move: impl Fn(usize) -> bool,
+    ) -> Result<Self> {
+        let base = base(robot, tree, keys)?;
+        let held = held(robot, keys)?;
+        let is_free =
+            |k: usize| robot.joints[k].kind != Kind::Fixed && !held.contains_key(&k) && is_to_move(k);
+        let on_base = Seat { joint: None, frame: None };
         let mut assembly = Self { joints: Vec::new(), seats: vec![None; robot.links.len()] };
         let mut bodies: Vec<Vec<Body>> = Vec::new();
-        let mut idle = Vec::new();
-        for &link in &below {
-            let carrier = tree.carrier[link].filter(|_| link != base);
-            let seat = match carrier {
-                None => Seat { joint: None, frame: None },
+        for link in tree.below(base, robot) {
+            let seat = match tree.carrier[link].filter(|_| link != base) {
+                None => on_base,
                 Some(k) => {
                     let joint = &robot.joints[k];
-                    let on = assembly.seats[joint.parent].unwrap_or(Seat { joint: None, frame: None });
+                    let on = assembly.seats[joint.parent].unwrap_or(on_base);
                     if is_free(k) {
                         bodies.push(Vec::new());
                         assembly.joints.push(Moving::new(k, joint, &on));
                         Seat { joint: Some(assembly.joints.len() - 1), frame: None }
                     } else {
-                        let position = held.get(&k).copied();
-                        if position.is_none() && joint.kind != Kind::Fixed {
-                            idle.push(k);
-                        }
-                        let still = joint.origin.transform.then(&motion(joint, position));
+                        let still = joint.origin.transform.then(&motion(joint, held.get(&k).copied()));
                         let frame = on.frame.map_or(still, |frame| frame.then(&still));
                         Seat { joint: on.joint, frame: Some(frame) }
                     }
@@ -108,7 +127,6 @@ impl Assembly {
         for (moving, bodies) in assembly.joints.iter_mut().zip(&bodies) {
             moving.body = Body::merged(bodies);
         }
-        notices.extend(tell_idle(robot, &idle));
         Ok(assembly)
     }
 }
@@ -197,9 +215,9 @@ fn motion(joint: &Joint, position: Option<f64>) -> Transform {
 }
 
 /// Refuses joints that move a fingertip and are not of a kind that the law is for.
-fn refuse_unfit(robot: &Robot, free: &[usize]) -> Result<()> {
+fn refuse_unfit(robot: &Robot, moving: &[Moving]) -> Result<()> {
     let all = |unfit: &dyn Fn(&Joint) -> bool| -> Vec<&Joint> {
-        free.iter().map(|&k| &robot.joints[k]).filter(|joint| unfit(joint)).collect()
+        moving.iter().map(|moving| &robot.joints[moving.joint]).filter(|joint| unfit(joint)).collect()
     };
     let refuse = |joints: &[&Joint], problem: String, remedy: String| match joints {
         [] => Ok(()),

@@ -12,7 +12,7 @@ use nalgebra::Matrix3;
 use std::f64::consts::PI;
 
 /// Torques, N m, and speeds, rad/s, from which on a limit is taken for a placeholder.
-const PLACEHOLDER: f64 = 1000.0;
+pub(super) const PLACEHOLDER: f64 = 1000.0;
 
 /// Adds to the entry of a joint what the URDF says and the entry does not. `is_default` tells whether `[joint_defaults]` has a
 /// key, `parent_key` is that of the entry's parent.

@@ -2,7 +2,7 @@
 
 use super::super::error::{Place, SceneError, suggestion};
 use super::body::Body;
-use super::robot::{Dynamics, Joint, Kind, Limit, Link, Origin, Robot};
+use super::robot::{Dynamics, Joint, Kind, Limit, Link, Origin, Robot, Sphere};
 use super::transform::Transform;
 use super::xml::{Text, child, children, quote};
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
@@ -40,7 +40,8 @@ impl Robot {
             }
         }
         let reader = Reader { text, quaternions: version(root) >= (1, 1) };
-        let mut robot = Self { place, links: vec![], joints: vec![] };
+        let name = root.attribute("name").unwrap_or_default().into();
+        let mut robot = Self { place, name, links: vec![], joints: vec![] };
         for element in root.children().filter(Node::is_element) {
             reader.text.refuse_xacro(element)?;
             if element.tag_name().name() == "link" {
@@ -139,7 +140,7 @@ impl Reader<'_> {
             Some(inertial) => (self.body(&of, inertial)?, self.text.place(inertial)),
             None => (Body::none(), place.clone()),
         };
-        Ok(Link { name, place, body, body_place })
+        Ok(Link { name, place, body, body_place, spheres: self.spheres(element) })
     }
 
     fn body(&self, of: &str, inertial: Node<'_, '_>) -> Result<Body, SceneError> {
@@ -182,6 +183,18 @@ impl Reader<'_> {
             return Ok(Body { centre_m: origin.transform.offset_m, ..body });
         }
         Ok(body.seen_from(&origin.transform))
+    }
+
+    /// Spheres of a link; what can't be read of them is nobody's loss.
+    fn spheres(&self, link: Node<'_, '_>) -> Vec<Sphere> {
+        let shapes = children(link, "collision").chain(children(link, "visual"));
+        let spheres = shapes.filter_map(|shape| {
+            let sphere = child(child(shape, "geometry")?, "sphere")?;
+            let [radius_m] = self.text.numbers("", sphere, "radius").ok()??;
+            let centre_m = self.origin("", shape).ok()?.transform.offset_m;
+            (radius_m > 0.0).then_some(Sphere { centre_m, radius_m })
+        });
+        spheres.collect()
     }
 
     fn origin(&self, of: &str, parent: Node<'_, '_>) -> Result<Origin, SceneError> {

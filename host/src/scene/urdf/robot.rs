@@ -9,6 +9,7 @@ use nalgebra::Vector3;
 #[derive(Clone, Debug)]
 pub(super) struct Robot {
     pub(super) place: Place,
+    pub(super) name: String,
     pub(super) links: Vec<Link>,
     pub(super) joints: Vec<Joint>,
 }
@@ -22,6 +23,15 @@ pub(super) struct Link {
     pub(super) body: Body,
     /// Where that is written.
     pub(super) body_place: Place,
+    /// Spheres that stand for its shape.
+    pub(super) spheres: Vec<Sphere>,
+}
+
+/// A sphere among the shapes of a link, in the link's frame.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Sphere {
+    pub(super) centre_m: Vector3<f64>,
+    pub(super) radius_m: f64,
 }
 
 /// A joint.

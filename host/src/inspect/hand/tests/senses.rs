@@ -73,7 +73,7 @@ fn a_joint_that_counts_the_other_way_is_none_of_it() {
     for name in HandFile::built_in() {
         let file = HandFile::load(name).unwrap();
         // One joint, and all of them.
-        for turned in (0..file.joints.len()).map(|k| k..k + 1).chain([0..file.joints.len()]) {
+        for turned in (0..file.joints.len()).map(|k| k..k + 1).chain(std::iter::once(0..file.joints.len())) {
             let mut file = file.clone();
             for joint in &mut file.joints[turned] {
                 turn(joint);
