@@ -164,7 +164,12 @@ impl Document {
                 "",
                 format!("no built-in {} is called `{name}`", kind.word()),
                 suggestion(name, kind.built_in().iter().map(|(name, _)| *name))
-                    + " (a path has to end in .toml or contain a /)",
+                    + match kind {
+                        Kind::Object => {
+                            " (a path has to end in .toml or contain a /; a mesh in .stl or .obj)"
+                        }
+                        _ => " (a path has to end in .toml or contain a /)",
+                    },
             )),
         }
     }

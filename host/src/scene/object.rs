@@ -84,7 +84,7 @@ pub(super) fn object(file: &ObjectFile, warnings: &mut Vec<String>) -> Result<Ob
         return fail(
             "object.shape",
             format!("reaches {radius:.3e} m from its centre of mass"),
-            "give lengths in metres, between 0.1 mm and 10 m",
+            "has to be between 0.1 mm and 10 m: give lengths in metres, and a mesh its unit",
         );
     }
     let uniform = shape.mass_properties();
