@@ -356,10 +356,9 @@ fn objects_are_checked_and_made_from_meshes() {
             && file.contains("unit = \"mm\""),
         "{file}"
     );
-    assert_refused(
-        &["object", "new", &mesh, "--unit", "mm", "--mass-kg", "1"],
-        &["part.toml: is there already", "--force"],
-    );
+    let output = blindgrasp(&["object", "new", &mesh, "--unit", "mm", "--mass-kg", "1"]);
+    assert_eq!(output.status.code(), Some(2));
+    assert!(text(&output.stderr).contains("part.toml: is there already; name another with --out"));
     let output = blindgrasp(&["object", "check", &made, "--json"]);
     let check: Value = serde_json::from_slice(&output.stdout).expect("JSON");
     assert_eq!(check["verdict"], "good");
