@@ -21,7 +21,22 @@ const READERS: [(Reader, &str, &str, &str); 6] = [
 
 /// What may stand in the place of something else.
 const PIECES: [&[u8]; 16] = [
-    b"0", b"-1", b"1e-40", b"1e308", b"nan", b"-inf", b"4294967296", b"\"", b"\n", b"\r\n", b"\0", b"\xff", b"[", b"<", b"/>", b"= ",
+    b"0",
+    b"-1",
+    b"1e-40",
+    b"1e308",
+    b"nan",
+    b"-inf",
+    b"4294967296",
+    b"\"",
+    b"\n",
+    b"\r\n",
+    b"\0",
+    b"\xff",
+    b"[",
+    b"<",
+    b"/>",
+    b"= ",
 ];
 
 #[test]
@@ -35,20 +50,25 @@ fn damaged_copies_are_refused_in_one_line_or_can_be_written_and_read_again() {
             seeds.extend(files(&models, "", ending));
         }
         let seeds: Vec<Vec<u8>> = seeds.iter().map(|path| fs::read(path).unwrap()).collect();
+        let good: Vec<Vec<u8>> =
+            seeds.iter().filter(|seed| reader.check(seed, folder.path())).cloned().collect();
         let mut accepted = 0;
-        for seed in &seeds {
-            reader.check(seed, folder.path());
-        }
         for copy in 0..COPIES {
             let mut random = fastrand::Rng::with_seed(copy as u64);
-            let mut bytes = seeds[copy % seeds.len()].clone();
+            // Of every second nothing was wrong.
+            let originals = if copy % 2 == 0 { &good } else { &seeds };
+            let mut bytes = originals[random.usize(..originals.len())].clone();
             for _ in 0..random.usize(1..=3) {
                 damage(&mut bytes, &seeds, &mut random);
             }
             accepted += usize::from(reader.check(&bytes, folder.path()));
         }
-        println!("{reader:?}: {} seeds, {accepted} of {COPIES} damaged copies accepted", seeds.len());
-        assert!(accepted > 0 && accepted < COPIES);
+        println!(
+            "{reader:?}: {} seeds, {} of them good; {accepted} of {COPIES} damaged copies accepted",
+            seeds.len(),
+            good.len()
+        );
+        assert!(accepted > COPIES / 50 && accepted < COPIES);
     }
 }
 

@@ -81,7 +81,10 @@ fn children() -> Usage {
 }
 
 fn processor_s(usage: &Usage) -> f64 {
-    [usage.user_time(), usage.system_time()].map(|time| time.tv_sec() as f64 + time.tv_usec() as f64 * 1e-6).iter().sum()
+    [usage.user_time(), usage.system_time()]
+        .map(|time| time.tv_sec() as f64 + time.tv_usec() as f64 * 1e-6)
+        .iter()
+        .sum()
 }
 
 /// The unit of the peak differs between systems.
@@ -151,7 +154,12 @@ fn every_file_is_in_the_table_and_there_are_enough() {
         assert!(name == "expected.toml" || listed.contains(&name.as_str()), "{name} is not in expected.toml");
     }
     for input in &inputs {
-        assert_ne!(input.is_made(), corpus().join(&input.file).exists(), "{}: committed, or made", input.file);
+        assert_ne!(
+            input.is_made(),
+            corpus().join(&input.file).exists(),
+            "{}: committed, or made",
+            input.file
+        );
         assert!(input.run.contains(&input.file) || input.first.is_some(), "{}: not what is run", input.file);
     }
 }

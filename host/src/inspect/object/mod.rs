@@ -121,8 +121,10 @@ impl ObjectCheck {
         let is_mesh = mesh::is_mesh(name_or_path);
         let whole = Place::whole(name_or_path);
         let loaded = if is_mesh {
-            mesh::load(name_or_path, wanted.unit)
-                .map(|(shape, notices)| Self::of(&bare(name_or_path, shape), &notices, &whole, wanted))
+            mesh::load(name_or_path, wanted.unit).map(|(shape, notices)| Self {
+                name: stem(name_or_path),
+                ..Self::of(&bare(shape), &notices, &whole, wanted)
+            })
         } else {
             ObjectFile::load_with_places(name_or_path).map(|(file, places)| {
                 let mut check = Self::of(&file, &places.notices, &whole, wanted);
@@ -209,10 +211,10 @@ impl ObjectCheck {
 }
 
 /// A mesh file as an object. Its mass is not known: any will do.
-fn bare(path: &str, shape: ShapeFile) -> ObjectFile {
+fn bare(shape: ShapeFile) -> ObjectFile {
     ObjectFile {
         schema: SCHEMA,
-        name: stem(path),
+        name: "mesh".to_owned(),
         description: String::new(),
         mass_kg: None,
         density_kg_m3: None,
