@@ -1,6 +1,7 @@
 //! Checks of single values, and the errors that they make.
 
 use super::error::SceneError;
+use super::file::SCHEMA;
 
 /// What a check gives.
 pub(super) type Result<T> = std::result::Result<T, SceneError>;
@@ -49,6 +50,15 @@ pub(super) fn distinct<'a>(list: &str, names: impl Iterator<Item = &'a str>) -> 
         seen.push(word);
     }
     Ok(())
+}
+
+/// The version of a file's format.
+pub(super) fn schema(key: &str, version: u32) -> Result<()> {
+    if version == SCHEMA {
+        return Ok(());
+    }
+    let remedy = format!("write it as format {SCHEMA}");
+    fail(key, format!("{version} is a format that this program does not know"), remedy)
 }
 
 /// A name that can be shown in one line.

@@ -39,6 +39,27 @@ impl Kind {
         }
     }
 
+    /// Refuses a file of another kind, by what every file of a kind has: otherwise the first of its keys would be unknown.
+    fn refuse_others(self, node: &Node) -> Result<(), SceneError> {
+        let has = |kind| match kind {
+            Self::Scene => node.get("pose").is_some(),
+            Self::Hand => node.get("fingertip").is_some(),
+            Self::Object => node.get("shape").is_some(),
+        };
+        let other = [Self::Scene, Self::Hand, Self::Object].into_iter().find(|&kind| has(kind));
+        match other {
+            Some(other) if !has(self) => {
+                let article = |kind: Self| if kind == Self::Object { "an" } else { "a" };
+                let other = format!("{} {}", article(other), other.word());
+                let own = format!("{} {}", article(self), self.word());
+                let problem = format!("describes {other}, not {own}");
+                Err(SceneError::new("", problem, format!("name the file of {own}"))
+                    .at(&Place::whole(&node.place.source)))
+            }
+            _ => Ok(()),
+        }
+    }
+
     /// Names and texts.
     pub(super) fn built_in(self) -> &'static [(&'static str, &'static str)] {
         match self {
@@ -150,10 +171,16 @@ impl Document {
                 remedy,
             ));
         }
+        if kind == Kind::Object && mesh::is_mesh(name) {
+            let remedy = format!("`blindgrasp object new {name}` writes an object's file that names it");
+            return Err(SceneError::new("", "a mesh alone is no object: it has no unit and no mass", remedy));
+        }
         if is_path(name) {
             let path = folder.join(name);
             let text = read_text(&path, ".toml")?;
-            return Self::parse(&text, &path.to_string_lossy(), path.parent().unwrap_or(folder));
+            let document = Self::parse(&text, &path.to_string_lossy(), path.parent().unwrap_or(folder))?;
+            kind.refuse_others(&document.node)?;
+            return Ok(document);
         }
         match kind.built_in().iter().find(|(built_in, _)| *built_in == name) {
             Some((_, text)) => Ok(Self {
@@ -164,7 +191,12 @@ impl Document {
                 "",
                 format!("no built-in {} is called `{name}`", kind.word()),
                 suggestion(name, kind.built_in().iter().map(|(name, _)| *name))
-                    + " (a path has to end in .toml or contain a /)",
+                    + match kind {
+                        Kind::Object => {
+                            " (a path has to end in .toml or contain a /; of meshes, .stl and .obj are read)"
+                        }
+                        _ => " (a path has to end in .toml or contain a /)",
+                    },
             )),
         }
     }

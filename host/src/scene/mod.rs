@@ -272,9 +272,14 @@ impl ObjectFile {
     /// # Errors
     /// As [`Self::load`].
     pub fn load_with_notices(name_or_path: &str) -> Result<(Self, Vec<Notice>), SceneError> {
+        Self::load_with_places(name_or_path).map(|(file, places)| (file, places.notices))
+    }
+
+    /// The same, with where its values come from.
+    pub(crate) fn load_with_places(name_or_path: &str) -> Result<(Self, Places), SceneError> {
         let mut notices = Vec::new();
-        let node = open(Kind::Object, name_or_path)?.complete_object(&mut notices)?;
-        Ok((read::read(&node, "")?, notices))
+        let tree = open(Kind::Object, name_or_path)?.complete_object(&mut notices)?;
+        Ok((read::read(&tree, "")?, Places { tree, notices }))
     }
 }
 

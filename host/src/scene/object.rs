@@ -1,7 +1,7 @@
 //! The object of a scene: its shape, mass and inertia.
 
 use super::{
-    check::{Result, all_within, fail, within},
+    check::{Result, all_within, fail, name, schema, within},
     error::SceneError,
     file::{InertiaFile, ObjectFile, ShapeFile},
 };
@@ -28,6 +28,8 @@ impl ObjectFile {
     /// # Errors
     /// What is wrong, with the key in the object's file.
     pub fn body(&self, warnings: &mut Vec<String>) -> Result<ObjectBody> {
+        schema("schema", self.schema)?;
+        name("name", &self.name)?;
         let bare = self.mass_kg.is_none() && self.density_kg_m3.is_none();
         let weighed =
             ObjectFile { density_kg_m3: bare.then_some(1000.0).or(self.density_kg_m3), ..self.clone() };
@@ -84,7 +86,7 @@ pub(super) fn object(file: &ObjectFile, warnings: &mut Vec<String>) -> Result<Ob
         return fail(
             "object.shape",
             format!("reaches {radius:.3e} m from its centre of mass"),
-            "give lengths in metres, between 0.1 mm and 10 m",
+            "has to be between 0.1 mm and 10 m: give lengths in metres, and a mesh its unit",
         );
     }
     let uniform = shape.mass_properties();

@@ -119,13 +119,21 @@ impl ObjectCheck {
     /// a mesh file's unit is not given. That its triangles enclose no body is a finding.
     pub fn load(name_or_path: &str, wanted: &Wanted) -> Result<Self, SceneError> {
         let is_mesh = mesh::is_mesh(name_or_path);
+        let whole = Place::whole(name_or_path);
         let loaded = if is_mesh {
-            mesh::load(name_or_path, wanted.unit).map(|(shape, notices)| (bare(name_or_path, shape), notices))
+            mesh::load(name_or_path, wanted.unit).map(|(shape, notices)| Self {
+                name: stem(name_or_path),
+                ..Self::of(&bare(shape), &notices, &whole, wanted)
+            })
         } else {
-            ObjectFile::load_with_notices(name_or_path)
+            ObjectFile::load_with_places(name_or_path).map(|(file, places)| {
+                let mut check = Self::of(&file, &places.notices, &whole, wanted);
+                check.findings.locate(|key| places.of(key));
+                check
+            })
         };
         match loaded {
-            Ok((file, notices)) => Ok(Self::of(&file, &notices, &Place::whole(name_or_path), wanted)),
+            Ok(check) => Ok(check),
             // The file is there and its unit is known: what is wrong is in its triangles.
             Err(error)
                 if is_mesh && wanted.unit.is_some() && std::path::Path::new(name_or_path).is_file() =>
@@ -203,10 +211,10 @@ impl ObjectCheck {
 }
 
 /// A mesh file as an object. Its mass is not known: any will do.
-fn bare(path: &str, shape: ShapeFile) -> ObjectFile {
+fn bare(shape: ShapeFile) -> ObjectFile {
     ObjectFile {
         schema: SCHEMA,
-        name: stem(path),
+        name: "mesh".to_owned(),
         description: String::new(),
         mass_kg: None,
         density_kg_m3: None,

@@ -1,6 +1,7 @@
 //! A check for people: numbers, a table of the faces, and the findings.
 
 use super::ObjectCheck;
+use crate::scene::one_line;
 use std::fmt::Write as _;
 
 /// The faces that are shown: the widest, where there are many.
@@ -16,7 +17,8 @@ pub(super) fn describe(check: &ObjectCheck) -> String {
         text = text + &line + "\n";
     }
     let _ = writeln!(text, "{}", check.findings.summary());
-    text
+    // Names come from files, and may contain what would steer a terminal.
+    text.lines().map(|line| one_line(line) + "\n").collect()
 }
 
 fn body(check: &ObjectCheck, text: &mut String) {

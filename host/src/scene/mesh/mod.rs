@@ -49,6 +49,12 @@ pub use unit::Unit;
 /// What a mesh file may be scaled by.
 const SCALES: [f64; 2] = [1e-6, 1e6];
 
+/// No body has a vertex farther than this from the origin, m.
+const FARTHEST_M: f64 = 1e6;
+
+/// What is quoted of a file in an error, characters.
+const LONGEST_EXCERPT: usize = 60;
+
 /// What to do about what was repaired.
 const REPAIRED: &str = "it is used as repaired";
 
@@ -150,6 +156,14 @@ pub fn load(path: &str, unit: Option<Unit>) -> Result<(ShapeFile, Vec<Notice>)> 
     Ok((shape, notices.into_iter().map(notice).collect()))
 }
 
+/// As much of a file's text as an error quotes.
+fn excerpt(text: &str) -> String {
+    match text.char_indices().nth(LONGEST_EXCERPT) {
+        Some((end, _)) => format!("{}...", &text[..end]),
+        None => text.into(),
+    }
+}
+
 /// Whether a name is that of a mesh file.
 pub fn is_mesh(name: &str) -> bool {
     ending(name).is_some_and(|ending| ending == "stl" || ending == "obj")
@@ -173,5 +187,11 @@ fn parse(name: &str, home: &Home, named_at: &Place) -> std::result::Result<Soup,
 /// From what the file says to a closed surface in metres.
 fn body(mut soup: Soup, unit: Unit, scale: f64) -> std::result::Result<Repaired, Problem> {
     soup.scale(|length| unit.metres(length * scale));
+    let is_far = |corner: &nalgebra::Vector3<f64>| !(corner.amax() <= FARTHEST_M);
+    if let Some(k) = soup.triangles.iter().position(|corners| corners.iter().any(is_far)) {
+        let number = soup.numbers[k] + 1;
+        let what = format!("triangle {number} has a corner more than {FARTHEST_M:e} m from the origin");
+        return Err(Problem::new(what, "check its unit and its scale, or export it again"));
+    }
     repair(soup).map_err(|fault| Problem::new(fault.to_string(), fault.remedy()))
 }

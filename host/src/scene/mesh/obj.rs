@@ -25,7 +25,18 @@ pub(super) fn read(bytes: Vec<u8>) -> Result<Soup, Problem> {
     let (models, _) = loaded.map_err(|error| match error {
         LoadError::FaceVertexOutOfBounds => beyond(&bytes),
         error => {
-            Problem::new(format!("line {}: {error}", lines.line), "export it again as triangles or polygons")
+            let words = String::from_utf8_lossy(&lines.buffer);
+            let words = super::excerpt(words.trim());
+            let (problem, remedy) = match error {
+                LoadError::PositionParseError => {
+                    (format!("`{words}` is no vertex"), "has to be `v x y z`, in numbers")
+                }
+                LoadError::FaceParseError => {
+                    (format!("`{words}` is no face"), "has to be `f` and the numbers of its vertices")
+                }
+                error => (error.to_string(), "export it again as triangles or polygons"),
+            };
+            Problem::new(format!("line {}: {problem}", lines.line), remedy)
         }
     })?;
     let mut soup = Soup::default();
@@ -67,6 +78,9 @@ pub(super) fn read(bytes: Vec<u8>) -> Result<Soup, Problem> {
             }
             face += 1;
         }
+    }
+    if face == 0 {
+        return Err(Problem::new("has no face", "export the surface of the body; is this an OBJ file?"));
     }
     Ok(soup)
 }

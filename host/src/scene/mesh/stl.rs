@@ -74,6 +74,16 @@ fn ascii(text: &[u8]) -> Result<Soup, Problem> {
             ended = is(b"endsolid");
             continue;
         }
+        let coordinates = words.split(u8::is_ascii_whitespace).filter(|word| !word.is_empty()).skip(1);
+        if is(b"vertex")
+            && let Some(word) = coordinates.map(String::from_utf8_lossy).find(|word| !is_finite(word))
+        {
+            let word = super::excerpt(&word);
+            return Err(Problem::new(
+                format!("line {line}: `{word}` is no finite number"),
+                "export it again",
+            ));
+        }
         if is(b"facet") {
             lines_of.push(line);
             too_many(lines_of.len())?;
@@ -86,6 +96,11 @@ fn ascii(text: &[u8]) -> Result<Soup, Problem> {
     }
     clean.extend(b"endsolid x\n");
     gather(clean, lines_of.len(), |triangle| lines_of.get(triangle).copied())
+}
+
+/// Whether a word is a number that a binary file could hold.
+fn is_finite(word: &str) -> bool {
+    word.parse::<f32>().is_ok_and(f32::is_finite)
 }
 
 fn too_many(count: usize) -> Result<(), Problem> {

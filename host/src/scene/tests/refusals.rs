@@ -208,7 +208,7 @@ fn errors_in_hands_and_objects_name_their_file() {
         ),
         (
             "object.shape.box.size_m.1=48",
-            "objects/cube.toml:8: object.shape: reaches 2.400e1 m from its centre of mass; give lengths in metres, between 0.1 mm and 10 m",
+            "objects/cube.toml:8: object.shape: reaches 2.400e1 m from its centre of mass; has to be between 0.1 mm and 10 m: give lengths in metres, and a mesh its unit",
         ),
         ("object.shape.box.sze=1", "--set: object.shape.box.sze: unknown key; did you mean `size_m`?"),
         (

@@ -13,6 +13,9 @@ const MOST_PARTS: usize = 2000;
 /// How far an axis may be from a unit vector: files with three decimals are that far off.
 const AXIS_SLACK: f64 = 1e-3;
 
+/// Shorter ones have no direction that was meant.
+const SHORTEST_AXIS: f64 = 1e-4;
+
 /// How far the square of a product of inertia may be above the product of its moments, relatively: rounded digits.
 const PRODUCT_SLACK: f64 = 1e-4;
 
@@ -306,7 +309,7 @@ impl Reader<'_> {
             return Ok((axis, place)); // Means nothing.
         }
         let length = blindgrasp_shared::math::norm(&axis);
-        if length == 0.0 {
+        if length < SHORTEST_AXIS {
             return self.fail(
                 element,
                 format!("{of}: the axis is zero"),

@@ -159,7 +159,7 @@ fn stl_files_that_lie_are_refused() {
     );
     assert_eq!(
         refusal(text.replacen("vertex 60 0 0", "vertex 60 0 nan", 1).as_bytes()),
-        "triangle 1 (line 2): expected finite f32, got NaN which is Nan; export it again"
+        "line 4: `nan` is no finite number; export it again"
     );
     assert_eq!(
         refusal(text.replacen("vertex 0 0 30", "vertex 0 0", 1).as_bytes()),
@@ -214,8 +214,8 @@ fn obj_files_that_lie_are_refused() {
     let text = String::from_utf8(wavefront(&bracket())).unwrap();
     let refusal = |text: &str| refusal("x.obj", text.as_bytes());
     let changed = |from: &str, to: &str| refusal(&text.replacen(from, to, 1));
-    assert_eq!(refusal(""), "it has no triangles; export the body as a mesh of triangles");
-    assert_eq!(refusal("v 1 2 3\n"), "it has no triangles; export the body as a mesh of triangles");
+    assert_eq!(refusal(""), "has no face; export the surface of the body; is this an OBJ file?");
+    assert_eq!(refusal("v 1 2 3\n"), "has no face; export the surface of the body; is this an OBJ file?");
     assert_eq!(
         changed("f 1 3 2", "f 1 3 13"),
         "line 15: vertex 13, but there are 12 vertices; export it again"
@@ -234,7 +234,7 @@ fn obj_files_that_lie_are_refused() {
     );
     assert_eq!(
         changed("f 1 3 2", "f 1 3 x"),
-        "line 15: face parse error; export it again as triangles or polygons"
+        "line 15: `f 1 3 x` is no face; has to be `f` and the numbers of its vertices"
     );
     assert_eq!(
         changed("f 1 3 2", "f 1 3"),
@@ -246,7 +246,7 @@ fn obj_files_that_lie_are_refused() {
     );
     assert_eq!(
         changed("v 60 0 0", "v 60 0"),
-        "line 4: position parse error; export it again as triangles or polygons"
+        "line 4: `v 60 0` is no vertex; has to be `v x y z`, in numbers"
     );
     assert_eq!(
         changed("v 60 0 0", "v 60 0 0 0"),

@@ -106,7 +106,10 @@ fn guess(robot: &Robot, tree: &Tree, keys: &Keys) -> Result<Vec<Tip>> {
         names.join(", ")
     };
     match told.len() {
-        0 => Err(none_found(robot, "no link moves")),
+        0 => {
+            let remedy = "a hand needs revolute joints that --lock does not hold still";
+            Err(SceneError::new("", "no joint moves", remedy).at(&robot.place))
+        }
         1 => Err(none_found(robot, &format!("only link {} looks like a fingertip", names()))),
         count if count > MAX_FINGERS => Err(none_found(
             robot,
