@@ -252,6 +252,14 @@ fn with_the_printed_gains_it_is_held_for_long_but_not_for_ever() {
     let speeds = [2, 5, 10, 20].map(|t_s| fastest_joint_rad_s(&run, t_s));
     assert!(speeds.windows(2).all(|pair| pair[1] < pair[0]) && speeds[3] < 0.1, "{speeds:?}");
     assert!(run.summary.settle_time_s.is_none());
+    // Fingers 1 and 3 are stretched out by then. Where their Jacobians degenerate, nothing makes the residuals of Eq. 38 vanish.
+    let (creeping, hand) = (&run.samples[40_000], HandFile::load("hand-arm").expect("it is built in"));
+    let angle = |name: &str| {
+        let joint = hand.joints.iter().position(|joint| joint.name == name).expect("it is there");
+        creeping.angles_rad[joint]
+    };
+    assert!(["finger-1-flex-2", "finger-3-flex-2"].iter().all(|knee| angle(knee).abs() < 0.01));
+    assert!(creeping.contacts.iter().any(|contact| contact.force_residual_n.norm() > 0.5));
     // At rest, u_st would have to hold what the tangential part of the law's pull turns (Eqs. 53 and 54). What it has at the
     // most, in any attitude, is about half of that for fingers 2 and 3.
     let most_nm = 4.0 * load("hand-arm", &[]).control.attitude_stiffness_nm;

@@ -7,7 +7,7 @@ use super::file::SCHEMA;
 pub(super) type Result<T> = std::result::Result<T, SceneError>;
 
 /// Bytes of a name.
-const LONGEST_NAME: usize = 100;
+pub(super) const LONGEST_NAME: usize = 100;
 
 pub(super) fn fail<T>(
     key: impl Into<String>,

@@ -64,21 +64,26 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
     Ok(Outcome::Shown)
 }
 
-/// A file's path from a folder, where there is one.
+/// How a file in a folder names another: relative, unless it was named by an absolute path and is further up.
 fn relative(file: &Path, folder: &Path) -> PathBuf {
-    let whole = |path: &Path| {
-        if path.as_os_str().is_empty() { Path::new(".").canonicalize() } else { path.canonicalize() }
+    let whole = |path: Option<&Path>| match path {
+        None => Path::new(".").canonicalize(),
+        Some(path) if path.as_os_str().is_empty() => Path::new(".").canonicalize(),
+        Some(path) => path.canonicalize(),
     };
-    if file.is_absolute() || file.parent() == Some(folder) {
-        let name = file.file_name().map_or_else(|| file.to_path_buf(), PathBuf::from);
-        return if file.is_absolute() && file.parent() != Some(folder) { file.to_path_buf() } else { name };
+    let (Ok(from), Ok(to), Some(name)) = (whole(Some(folder)), whole(file.parent()), file.file_name()) else {
+        return file.to_path_buf(); // It can't be read either, which is told there.
+    };
+    if let Ok(below) = to.strip_prefix(&from) {
+        return below.join(name);
     }
-    let (Ok(file_whole), Ok(folder_whole)) = (whole(file), whole(folder)) else { return file.to_path_buf() };
-    let (from, to): (Vec<Component<'_>>, Vec<Component<'_>>) =
-        (folder_whole.components().collect(), file_whole.components().collect());
-    let shared = from.iter().zip(&to).take_while(|(a, b)| a == b).count();
-    let up = std::iter::repeat_n(Component::ParentDir, from.len() - shared);
-    up.chain(to[shared..].iter().copied()).collect()
+    if file.is_absolute() {
+        return file.to_path_buf();
+    }
+    let shared = from.components().zip(to.components()).take_while(|(a, b)| a == b).count();
+    let up = from.components().skip(shared).map(|_| Component::ParentDir);
+    let down = to.components().skip(shared);
+    up.chain(down).collect::<PathBuf>().join(name)
 }
 
 /// `LINK[:x,y,z[:radius_m]]`; the link's name may have colons itself.

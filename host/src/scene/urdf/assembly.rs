@@ -12,9 +12,13 @@ use super::robot::{Joint, Kind, Robot};
 use super::topology::Tree;
 use super::transform::{Transform, roll_pitch_yaw};
 use super::xml::quote;
+use crate::MAX_JOINTS;
 use blindgrasp_shared::math::Real;
 use nalgebra::{Quaternion, UnitQuaternion};
 use std::collections::BTreeMap;
+
+/// Joints that are named in a message.
+pub(super) const MOST_NAMES: usize = 6;
 
 /// A hand's joints and bodies.
 #[derive(Clone, Debug)]
@@ -65,27 +69,23 @@ impl Assembly {
         for &link in fingertips {
             tree.above(link, robot).for_each(|joint| moves_fingertip[joint] = true);
         }
-        let assembly = Self::put_together(robot, tree, keys, |k| moves_fingertip[k])?;
+        let mut assembly = Self::put_together(robot, tree, keys, |k| moves_fingertip[k])?;
         refuse_unfit(robot, &assembly.joints)?;
-        let held = held(robot, keys)?;
-        let is_idle = |k: &usize| {
-            robot.joints[*k].kind != Kind::Fixed
-                && !moves_fingertip[*k]
-                && !held.contains_key(k)
-                && assembly.seats[robot.joints[*k].parent].is_some()
-        };
-        let idle: Vec<usize> = (0..robot.joints.len()).filter(is_idle).collect();
-        notices.extend(tell_idle(robot, &idle));
+        refuse_crowd(robot, assembly.joints.len())?;
+        assembly.merge(robot, true)?;
+        notices.extend(tell_idle(robot, &assembly.idle(robot, keys)));
         notices.extend(tell_massless(robot, &assembly.joints));
         Ok(assembly)
     }
 
-    /// The same with every joint that is not to be held still, of whatever kind.
+    /// The same with every joint that is not to be held still, of whatever kind and number; a mass that can't be read is none.
     ///
     /// # Errors
     /// A base or a joint to hold still that is not there.
     pub(super) fn of_all(robot: &Robot, tree: &Tree, keys: &Keys) -> Result<Self> {
-        Self::put_together(robot, tree, keys, |_| true)
+        let mut assembly = Self::put_together(robot, tree, keys, |_| true)?;
+        assembly.merge(robot, false)?;
+        Ok(assembly)
     }
 
     /// Of the joints that are neither fixed nor to be held still, those move that are to.
@@ -101,7 +101,6 @@ impl Assembly {
             |k: usize| robot.joints[k].kind != Kind::Fixed && !held.contains_key(&k) && is_to_move(k);
         let on_base = Seat { joint: None, frame: None };
         let mut assembly = Self { joints: Vec::new(), seats: vec![None; robot.links.len()] };
-        let mut bodies: Vec<Vec<Body>> = Vec::new();
         for link in tree.below(base, robot) {
             let seat = match tree.carrier[link].filter(|_| link != base) {
                 None => on_base,
@@ -109,7 +108,6 @@ impl Assembly {
                     let joint = &robot.joints[k];
                     let on = assembly.seats[joint.parent].unwrap_or(on_base);
                     if is_free(k) {
-                        bodies.push(Vec::new());
                         assembly.joints.push(Moving::new(k, joint, &on));
                         Seat { joint: Some(assembly.joints.len() - 1), frame: None }
                     } else {
@@ -120,15 +118,39 @@ impl Assembly {
                 }
             };
             assembly.seats[link] = Some(seat);
-            if let Some(joint) = seat.joint {
-                let body = &robot.links[link].body;
-                bodies[joint].push(seat.frame.map_or(*body, |frame| body.seen_from(&frame)));
-            }
-        }
-        for (moving, bodies) in assembly.joints.iter_mut().zip(&bodies) {
-            moving.body = Body::merged(bodies);
         }
         Ok(assembly)
+    }
+
+    /// Takes together what each joint carries. Masses of links that do not move may be wrong; others too, if not `all` count.
+    fn merge(&mut self, robot: &Robot, all: bool) -> Result<()> {
+        let mut bodies: Vec<Vec<Body>> = vec![Vec::new(); self.joints.len()];
+        for (link, seat) in robot.links.iter().zip(&self.seats) {
+            let Some(Seat { joint: Some(joint), frame }) = *seat else { continue };
+            match &link.body {
+                Ok(body) => bodies[joint].push(frame.map_or(*body, |frame| body.seen_from(&frame))),
+                Err(error) if all => return Err(error.clone()),
+                Err(_) => {}
+            }
+        }
+        for (moving, bodies) in self.joints.iter_mut().zip(&bodies) {
+            moving.body = Body::merged(bodies);
+        }
+        Ok(())
+    }
+
+    /// The robot's joints that could move, but move no fingertip; in the file's order.
+    pub(super) fn idle(&self, robot: &Robot, keys: &Keys) -> Vec<usize> {
+        let is_idle = |k: &usize| {
+            let joint = &robot.joints[*k];
+            joint.kind != Kind::Fixed
+                && self.seats[joint.parent].is_some()
+                && self.seats[joint.child].is_some()
+                && self.joints.iter().all(|moving| moving.joint != *k)
+                && !keys.locked_rad.contains_key(&joint.name)
+                && !keys.locked_m.contains_key(&joint.name)
+        };
+        (0..robot.joints.len()).filter(is_idle).collect()
     }
 }
 
@@ -254,11 +276,24 @@ fn refuse_unfit(robot: &Robot, moving: &[Moving]) -> Result<()> {
     Ok(())
 }
 
-/// Joints by name, with `is` or `are`.
+fn refuse_crowd(robot: &Robot, count: usize) -> Result<()> {
+    if count <= MAX_JOINTS {
+        return Ok(());
+    }
+    let problem = format!("{count} joints move a fingertip: at most {MAX_JOINTS} are supported");
+    let remedy = "choose a `base` closer to the hand, hold joints still, or name fewer fingertips";
+    Err(SceneError::new("", problem, remedy).at(&robot.place))
+}
+
+/// Joints by name, the first few of many, with `is` or `are`.
 fn subject(joints: &[&Joint]) -> (String, &'static str) {
     let names: Vec<String> = joints.iter().map(|joint| format!("`{}`", quote(&joint.name))).collect();
     match names.len() {
         1 => (format!("joint {}", names[0]), "is"),
+        count if count > MOST_NAMES => {
+            let named = names[..MOST_NAMES].join(", ");
+            (format!("joints {named} and {} more", count - MOST_NAMES), "are")
+        }
         _ => (format!("joints {}", names.join(", ")), "are"),
     }
 }
@@ -277,7 +312,7 @@ fn hold(joints: &[&Joint], list: &str) -> String {
 }
 
 /// Where a joint is held of which it is not said: at zero, or the limit nearest to it.
-fn resting(joint: &Joint) -> f64 {
+pub(super) fn resting(joint: &Joint) -> f64 {
     let (lower, upper) = range(joint);
     0.0_f64.max(lower).min(upper)
 }

@@ -2,7 +2,7 @@
 
 use super::super::error::{Place, SceneError, suggestion};
 use super::body::Body;
-use super::robot::{Dynamics, Joint, Kind, Limit, Link, Origin, Robot, Sphere};
+use super::robot::{Dynamics, Joint, Kind, Limit, Link, Origin, Robot, Shape};
 use super::transform::Transform;
 use super::xml::{Text, child, children, quote};
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
@@ -140,10 +140,10 @@ impl Reader<'_> {
         let (name, place) = (self.name(element)?, self.text.place(element));
         let of = format!("link `{}`", quote(&name));
         let (body, body_place) = match child(element, "inertial") {
-            Some(inertial) => (self.body(&of, inertial)?, self.text.place(inertial)),
-            None => (Body::none(), place.clone()),
+            Some(inertial) => (self.body(&of, inertial), self.text.place(inertial)),
+            None => (Ok(Body::none()), place.clone()),
         };
-        Ok(Link { name, place, body, body_place, spheres: self.spheres(element) })
+        Ok(Link { name, place, body, body_place, shapes: self.shapes(element) })
     }
 
     fn body(&self, of: &str, inertial: Node<'_, '_>) -> Result<Body, SceneError> {
@@ -188,16 +188,26 @@ impl Reader<'_> {
         Ok(body.seen_from(&origin.transform))
     }
 
-    /// Spheres of a link; what can't be read of them is nobody's loss.
-    fn spheres(&self, link: Node<'_, '_>) -> Vec<Sphere> {
+    /// Shapes of a link; what can't be read of them is nobody's loss.
+    fn shapes(&self, link: Node<'_, '_>) -> Vec<Shape> {
         let shapes = children(link, "collision").chain(children(link, "visual"));
-        let spheres = shapes.filter_map(|shape| {
-            let sphere = child(child(shape, "geometry")?, "sphere")?;
-            let [radius_m] = self.text.numbers("", sphere, "radius").ok()??;
+        let shapes = shapes.filter_map(|shape| {
+            let solid = child(shape, "geometry")?.first_element_child()?;
+            let number = |name| Some(self.text.numbers::<1>("", solid, name).ok()??[0]);
+            let (word, radius_m) = match solid.tag_name().name() {
+                "sphere" => ("sphere", number("radius")?),
+                "capsule" => ("capsule", number("radius")?),
+                "cylinder" => ("cylinder", number("radius")?.min(0.5 * number("length")?)),
+                "box" => {
+                    let sides: [f64; 3] = self.text.numbers("", solid, "size").ok()??;
+                    ("box", 0.5 * sides.into_iter().fold(f64::INFINITY, f64::min))
+                }
+                _ => return None,
+            };
             let centre_m = self.origin("", shape).ok()?.transform.offset_m;
-            (radius_m > 0.0).then_some(Sphere { centre_m, radius_m })
+            (radius_m > 0.0).then_some(Shape { word, centre_m, radius_m })
         });
-        spheres.collect()
+        shapes.collect()
     }
 
     fn origin(&self, of: &str, parent: Node<'_, '_>) -> Result<Origin, SceneError> {

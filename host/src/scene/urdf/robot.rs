@@ -1,6 +1,6 @@
 //! A URDF as it is written: links, joints, and where each of them stands.
 
-use super::super::error::{Place, suggestion};
+use super::super::error::{Place, SceneError, suggestion};
 use super::body::Body;
 use super::transform::{Transform, roll_pitch_yaw};
 use nalgebra::Vector3;
@@ -19,18 +19,22 @@ pub(super) struct Robot {
 pub(super) struct Link {
     pub(super) name: String,
     pub(super) place: Place,
-    /// Its own mass, in its frame.
-    pub(super) body: Body,
+    /// Its own mass, in its frame; what is wrong with it matters only if it moves.
+    pub(super) body: Result<Body, SceneError>,
     /// Where that is written.
     pub(super) body_place: Place,
-    /// Spheres that stand for its shape.
-    pub(super) spheres: Vec<Sphere>,
+    /// What it looks like, as far as no mesh is needed to know.
+    pub(super) shapes: Vec<Shape>,
 }
 
-/// A sphere among the shapes of a link, in the link's frame.
+/// A sphere, box, cylinder or capsule of a link.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Sphere {
+pub(super) struct Shape {
+    /// What it is.
+    pub(super) word: &'static str,
+    /// Its middle in the link's frame, m.
     pub(super) centre_m: Vector3<f64>,
+    /// Radius of the largest sphere that fits into it, m.
     pub(super) radius_m: f64,
 }
 

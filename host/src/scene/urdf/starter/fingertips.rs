@@ -7,7 +7,7 @@ use super::super::super::check::{Result, fail};
 use super::super::super::error::{Place, SceneError};
 use super::super::assembly::{Assembly, Seat};
 use super::super::keys::Keys;
-use super::super::robot::{Robot, Sphere};
+use super::super::robot::{Robot, Shape};
 use super::super::topology::Tree;
 use super::super::transform::Transform;
 use super::super::xml::quote;
@@ -17,6 +17,12 @@ use nalgebra::Vector3;
 
 /// Radius of a fingertip, as a share of the finger's length: 0.095 for the paper's hand.
 const RADIUS_SHARE: f64 = 0.1;
+/// What is said of that.
+const SHARE: &str = "a tenth of the finger's length";
+/// Smaller spheres are markers, not fingertips: radius, m.
+const MARKER_M: f64 = 2e-3;
+/// What is said of what the user said.
+pub(super) const ASKED: &str = "as asked";
 /// A link whose origin is closer to the joint that carries it does not tell where the finger ends, m.
 const SAME_PLACE_M: f64 = 1e-3;
 
@@ -62,24 +68,28 @@ fn asked(robot: &Robot, wanted: &FingertipRequest) -> Result<Tip> {
         let problem = format!("there is no link `{}`", quote(&wanted.link));
         return fail("", problem, robot.link_suggestion(&wanted.link));
     };
-    let sphere = outermost(&robot.links[link].spheres);
+    let sphere = spheres(robot, link).max_by(|a, b| reach(a).total_cmp(&reach(b)));
     let (offset_m, offset_from) = match (wanted.offset_m, sphere) {
-        (Some(offset), _) => (offset.into(), "as asked"),
+        (Some(offset), _) => (offset.into(), ASKED),
         (None, Some(sphere)) => (sphere.centre_m, "a sphere of the link"),
         (None, None) => (Vector3::zeros(), "the origin of the link"),
     };
     let (radius_m, radius_from) = match (wanted.radius_m, sphere) {
-        (Some(radius), _) => (Some(radius), "as asked"),
+        (Some(radius), _) => (Some(radius), ASKED),
         (None, Some(sphere)) => (Some(sphere.radius_m), "a sphere of the link"),
-        (None, None) => (None, "a tenth of the finger's length"),
+        (None, None) => (None, SHARE),
     };
     Ok(Tip { link, offset_m, radius_m, offset_from, radius_from, is_end: false })
 }
 
-/// The sphere that reaches furthest from the link's origin.
-fn outermost(spheres: &[Sphere]) -> Option<Sphere> {
-    let reach = |sphere: &Sphere| sphere.centre_m.norm() + sphere.radius_m;
-    spheres.iter().copied().max_by(|a, b| reach(a).total_cmp(&reach(b)))
+/// How far a shape reaches from its link's origin, m.
+fn reach(shape: &Shape) -> f64 {
+    shape.centre_m.norm() + shape.radius_m
+}
+
+/// The spheres of a link.
+fn spheres(robot: &Robot, link: usize) -> impl Iterator<Item = Shape> + '_ {
+    robot.links[link].shapes.iter().copied().filter(|shape| shape.word == "sphere")
 }
 
 /// The ends of the fingers, as far as anything tells them.
@@ -88,17 +98,15 @@ fn guess(robot: &Robot, tree: &Tree, keys: &Keys) -> Result<Vec<Tip>> {
     let mut told = Vec::new();
     let mut untold = Vec::new();
     for &end in &free.ends {
-        let links: Vec<usize> = free.carried_by(end);
-        match tell(robot, &free.assembly, &links) {
+        let finger = Finger { robot, assembly: &free.assembly, end, links: free.carried_by(end) };
+        match finger.with_a_sphere() {
             Some(tip) => told.push(tip),
-            None => untold.push((end, links)),
+            None if finger.has_a_tip_by_name() => told.push(finger.by_name()?),
+            None => untold.push(finger),
         }
     }
     if told.is_empty() {
-        told = untold
-            .iter()
-            .map(|(end, links)| from_mass(robot, &free.assembly, *end, links))
-            .collect::<Result<_>>()?;
+        told = untold.iter().map(Finger::by_shape_or_mass).collect::<Result<_>>()?;
     }
     let names = || {
         let names: Vec<String> =
@@ -110,8 +118,8 @@ fn guess(robot: &Robot, tree: &Tree, keys: &Keys) -> Result<Vec<Tip>> {
             let remedy = "a hand needs revolute joints that --lock does not hold still";
             Err(SceneError::new("", "no joint moves", remedy).at(&robot.place))
         }
-        1 => Err(none_found(robot, &format!("only link {} looks like a fingertip", names()))),
-        count if count > MAX_FINGERS => Err(none_found(
+        1 => Err(unclear(robot, &format!("only link {} looks like a fingertip", names()))),
+        count if count > MAX_FINGERS => Err(unclear(
             robot,
             &format!("{count} links look like fingertips, of which {MAX_FINGERS} can be used: {}", names()),
         )),
@@ -119,7 +127,7 @@ fn guess(robot: &Robot, tree: &Tree, keys: &Keys) -> Result<Vec<Tip>> {
     }
 }
 
-fn none_found(robot: &Robot, problem: &str) -> SceneError {
+fn unclear(robot: &Robot, problem: &str) -> SceneError {
     SceneError::new("", problem, "name the fingertips: --fingertip LINK[:x,y,z[:radius_m]]").at(&robot.place)
 }
 
@@ -145,64 +153,107 @@ impl Free {
     }
 }
 
-/// Where a link is in the frame of the joint that carries it.
-fn frame(assembly: &Assembly, link: usize) -> Transform {
-    assembly.seats[link].and_then(|seat| seat.frame).unwrap_or(Transform::identity())
+/// The end of a finger: a joint below which none moves, and the links that it carries.
+struct Finger<'a> {
+    robot: &'a Robot,
+    assembly: &'a Assembly,
+    /// Index among the assembly's joints.
+    end: usize,
+    links: Vec<usize>,
 }
 
-/// The fingertip among the links of a finger's end, if a sphere or a name tells it.
-fn tell(robot: &Robot, assembly: &Assembly, links: &[usize]) -> Option<Tip> {
-    let is_tip = |link: &usize| robot.links[*link].name.to_lowercase().contains("tip");
-    let named: Vec<usize> = links.iter().copied().filter(is_tip).collect();
-    let candidates =
-        if named.iter().any(|&link| !robot.links[link].spheres.is_empty()) { &named } else { links };
-    let spheres = candidates.iter().flat_map(|&link| {
-        let frame = frame(assembly, link);
-        robot.links[link]
-            .spheres
-            .iter()
-            .map(move |sphere| (link, *sphere, frame.point(&sphere.centre_m).norm() + sphere.radius_m))
-    });
-    if let Some((link, sphere, _)) = spheres.max_by(|a, b| a.2.total_cmp(&b.2)) {
-        return Some(Tip {
+impl Finger<'_> {
+    /// Where a link is in the frame of the joint that carries it.
+    fn frame(&self, link: usize) -> Transform {
+        self.assembly.seats[link].and_then(|seat| seat.frame).unwrap_or(Transform::identity())
+    }
+
+    fn named(&self) -> impl Iterator<Item = usize> + '_ {
+        let is_tip = |link: &usize| self.robot.links[*link].name.to_lowercase().contains("tip");
+        self.links.iter().copied().filter(is_tip)
+    }
+
+    fn has_a_tip_by_name(&self) -> bool {
+        self.named().next().is_some()
+    }
+
+    /// The shape that reaches furthest from the joint, of some links.
+    fn outermost(&self, shapes: impl Iterator<Item = (usize, Shape)>) -> Option<(usize, Shape)> {
+        let reach =
+            |(link, shape): &(usize, Shape)| self.frame(*link).point(&shape.centre_m).norm() + shape.radius_m;
+        shapes.max_by(|a, b| reach(a).total_cmp(&reach(b)))
+    }
+
+    /// A fingertip that is a sphere, if there is one: best of a link that is called a tip.
+    fn with_a_sphere(&self) -> Option<Tip> {
+        let of = |link: usize| {
+            let spheres = spheres(self.robot, link).filter(|sphere| sphere.radius_m >= MARKER_M);
+            spheres.map(move |shape| (link, shape))
+        };
+        let named = self.outermost(self.named().flat_map(of));
+        let (link, sphere) = named.or_else(|| self.outermost(self.links.iter().copied().flat_map(of)))?;
+        Some(Tip {
             link,
             offset_m: sphere.centre_m,
             radius_m: Some(sphere.radius_m),
             offset_from: "a sphere of the link",
             radius_from: "a sphere of the link",
             is_end: false,
-        });
+        })
     }
-    let reach = |link: &usize| frame(assembly, *link).offset_m.norm();
-    let link = named.into_iter().max_by(|a, b| reach(a).total_cmp(&reach(b)))?;
-    (reach(&link) > SAME_PLACE_M).then_some(Tip {
-        link,
-        offset_m: Vector3::zeros(),
-        radius_m: None,
-        offset_from: "the origin of the link, for its name",
-        radius_from: "a tenth of the finger's length",
-        is_end: false,
-    })
-}
 
-/// A fingertip from where the mass is: what ends a finger is taken for a uniform rod from its joint on, whose end is as far
-/// beyond its centre of mass as its joint is before it.
-fn from_mass(robot: &Robot, assembly: &Assembly, end: usize, links: &[usize]) -> Result<Tip> {
-    let joint = &assembly.joints[end];
-    let link = robot.joints[joint.joint].child;
-    if !(joint.body.centre_m.norm() > SAME_PLACE_M) {
-        let problem = format!(
-            "nothing tells where the finger ends whose last link is `{}`",
-            quote(&robot.links[links.last().copied().unwrap_or(link)].name)
-        );
-        return Err(none_found(robot, &problem));
+    /// A fingertip by the name of its link: the centre of mass of the link, if it is a part of its own, or its origin.
+    fn by_name(&self) -> Result<Tip> {
+        let distance = |link: &usize| self.frame(*link).offset_m.norm();
+        let furthest = self.named().max_by(|a, b| distance(a).total_cmp(&distance(b)));
+        let Some(link) = furthest.filter(|link| distance(link) > SAME_PLACE_M) else {
+            return self.by_shape_or_mass();
+        };
+        let centre = self.robot.links[link]
+            .body
+            .as_ref()
+            .ok()
+            .filter(|body| body.mass_kg > 0.0 && body.centre_m.norm() > SAME_PLACE_M);
+        let (offset_m, offset_from) = match centre {
+            Some(body) => (body.centre_m, "the centre of mass of the link, for its name"),
+            None => (Vector3::zeros(), "the origin of the link, for its name"),
+        };
+        Ok(Tip { link, offset_m, radius_m: None, offset_from, radius_from: SHARE, is_end: false })
     }
-    Ok(Tip {
-        link,
-        offset_m: joint.body.centre_m * 2.0,
-        radius_m: None,
-        offset_from: "the end of a uniform rod with the link's centre of mass",
-        radius_from: "a tenth of the finger's length",
-        is_end: true,
-    })
+
+    /// A fingertip from a box or the like, or from where the mass is: what ends a finger is taken for a uniform rod from its
+    /// joint on, whose end is as far beyond its centre of mass as its joint is before it.
+    fn by_shape_or_mass(&self) -> Result<Tip> {
+        let shapes = self
+            .links
+            .iter()
+            .flat_map(|&link| self.robot.links[link].shapes.iter().map(move |shape| (link, *shape)));
+        if let Some((link, shape)) = self.outermost(shapes)
+            && self.frame(link).point(&shape.centre_m).norm() > SAME_PLACE_M
+        {
+            return Ok(Tip {
+                link,
+                offset_m: shape.centre_m,
+                radius_m: Some(shape.radius_m),
+                offset_from: "the middle of a box, cylinder or capsule of the link",
+                radius_from: "half the least thickness of the same",
+                is_end: false,
+            });
+        }
+        let joint = &self.assembly.joints[self.end];
+        let link = self.robot.joints[joint.joint].child;
+        if !(joint.body.centre_m.norm() > SAME_PLACE_M) {
+            let name = quote(&self.robot.links[link].name);
+            let problem = format!("nothing tells where the finger ends whose last link is `{name}`");
+            return Err(unclear(self.robot, &problem));
+        }
+        Ok(Tip {
+            link,
+            offset_m: joint.body.centre_m * 2.0,
+            radius_m: None,
+            offset_from: "the end of a uniform rod with the link's centre of mass",
+            radius_from: SHARE,
+            is_end: true,
+        })
+    }
 }

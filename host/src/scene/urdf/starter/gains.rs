@@ -18,7 +18,8 @@ pub(super) const RADII: f64 = 15.0;
 pub(super) const INDENTATION: f64 = 0.08;
 /// Dry friction, as a share of the torque limit.
 pub(super) const FRICTION_SHARE: f64 = 0.004;
-/// Torque limits that nobody knows: a fingertip can press with so many times its finger's weight.
+/// A fingertip is made to press with at most so many times its finger's weight (4.4 in the paper's experiments), whatever the
+/// torque limits say: many URDFs say too much.
 pub(super) const WEIGHTS: f64 = 10.0;
 /// What is said of the damping gains.
 pub(super) const DAMPING_RULE: &str = "\
@@ -39,6 +40,8 @@ const STICKING_RATIO: f64 = 0.2;
 const PRESLIDING_RAD: f64 = 2e-4;
 /// Speed limits that nobody knows, rad/s.
 const SPEED_RAD_S: f64 = 10.0;
+/// A joint whose axis is closer to the fingertip's centre only turns it, m.
+const SHORTEST_LEVER_M: f64 = 1e-3;
 const GRAVITY_M_S2: f64 = 9.81;
 
 /// Numbers that hang on the whole hand.
@@ -46,6 +49,8 @@ pub(super) struct Gains {
     pub(super) force_n: f64,
     /// Index of the joint that decides about it.
     pub(super) weakest: usize,
+    /// What that joint would allow, if it is far more than the finger weighs.
+    pub(super) allowed_n: Option<f64>,
     pub(super) attitude_stiffness_nm: f64,
     pub(super) joints: Vec<JointGains>,
     pub(super) stiffnesses_n_m2: Vec<f64>,
@@ -95,6 +100,7 @@ impl Gains {
         Self {
             force_n: 1.0,
             weakest: 0,
+            allowed_n: None,
             attitude_stiffness_nm: 1.0,
             joints: vec![joint; draft.needs.len()],
             stiffnesses_n_m2: vec![1e6; draft.tips.len()],
@@ -127,9 +133,15 @@ impl Gains {
             left / measures.levers_m[*k]
         };
         let own = |k: &usize| (0..draft.tips.len()).filter(|&i| hand.moves(*k, i)).count() == 1;
-        let weakest =
-            (0..count).filter(own).min_by(|a, b| pressing(a).total_cmp(&pressing(b))).unwrap_or_default();
-        let force_n = rounded(FORCE_SHARE * pressing(&weakest));
+        let presses = |k: &usize| own(k) && measures.levers_m[*k] > SHORTEST_LEVER_M;
+        let Some(weakest) = (0..count).filter(presses).min_by(|a, b| pressing(a).total_cmp(&pressing(b)))
+        else {
+            let problem = "no joint of a finger moves its fingertip's centre";
+            let remedy = "name the fingertips and where they are: --fingertip LINK:x,y,z";
+            return Err(SceneError::new("", problem, remedy).at(&draft.robot.place));
+        };
+        let (allowed, most) = (FORCE_SHARE * pressing(&weakest), WEIGHTS * measures.finger_n);
+        let force_n = rounded(allowed.min(most));
         let radii: f64 = draft.radii_m.iter().sum();
         let tips = draft.tips.len() as f64;
         let joints = (0..count)
@@ -167,6 +179,7 @@ impl Gains {
         Ok(Self {
             force_n,
             weakest,
+            allowed_n: (allowed > most).then(|| rounded(allowed)),
             attitude_stiffness_nm: rounded(force_n * radii / tips / RADII),
             joints,
             stiffnesses_n_m2: draft.radii_m.iter().map(stiffness).collect(),

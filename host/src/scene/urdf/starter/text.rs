@@ -1,15 +1,15 @@
 //! The hand's file as a text, with the reason behind every guess.
 
-use super::super::super::check::Result;
+use super::super::super::check::{LONGEST_NAME, Result};
 use super::super::super::error::SceneError;
 use super::super::super::file::SCHEMA;
-use super::super::assembly::{Assembly, toml_key};
+use super::super::assembly::{Assembly, MOST_NAMES, resting, toml_key};
 use super::super::complete::PLACEHOLDER;
 use super::super::keys::Keys;
 use super::super::robot::{Joint, Kind, Robot};
 use super::super::topology::Tree;
 use super::super::xml::quote;
-use super::fingertips::{Tip, radius_of};
+use super::fingertips::{ASKED, Tip, radius_of};
 use super::gains::{self, Gains};
 use std::f64::consts::{FRAC_PI_2, PI};
 use std::fmt::Write as _;
@@ -24,6 +24,8 @@ pub(super) struct Draft<'a> {
     pub(super) radii_m: Vec<f64>,
     /// One a joint.
     pub(super) needs: Vec<Needs>,
+    /// Names of joints that move no fingertip.
+    idle: Vec<String>,
 }
 
 /// What the URDF does not say of a joint, or has a placeholder of.
@@ -63,9 +65,20 @@ fn has_friction(joint: &Joint) -> bool {
 }
 
 impl<'a> Draft<'a> {
-    pub(super) fn new(robot: &'a Robot, tree: &Tree, keys: Keys, mut tips: Vec<Tip>) -> Result<Self> {
+    pub(super) fn new(robot: &'a Robot, tree: &Tree, mut keys: Keys, mut tips: Vec<Tip>) -> Result<Self> {
         let links: Vec<usize> = tips.iter().map(|tip| tip.link).collect();
         let assembly = Assembly::new(robot, tree, &keys, &links, &mut Vec::new())?;
+        let mut idle = Vec::new();
+        for k in assembly.idle(robot, &keys) {
+            let joint = &robot.joints[k];
+            idle.push(format!("`{}`", quote(&joint.name)));
+            let list = match joint.kind {
+                Kind::Revolute | Kind::Continuous => &mut keys.locked_rad,
+                Kind::Prismatic => &mut keys.locked_m,
+                _ => continue,
+            };
+            list.insert(joint.name.clone(), resting(joint));
+        }
         let mut radii_m = Vec::with_capacity(tips.len());
         for tip in &mut tips {
             let Some(carrier) = assembly.seats[tip.link].and_then(|seat| seat.joint) else {
@@ -86,7 +99,7 @@ impl<'a> Draft<'a> {
             radii_m.push(radius_m);
         }
         let needs = assembly.joints.iter().map(|moving| Needs::of(&robot.joints[moving.joint])).collect();
-        Ok(Self { robot, keys, assembly, tips, radii_m, needs })
+        Ok(Self { robot, keys, assembly, tips, radii_m, needs, idle })
     }
 
     /// A joint of the hand as the URDF has it.
@@ -101,21 +114,37 @@ impl<'a> Draft<'a> {
 
     /// A word for the hand.
     fn name(&self) -> String {
-        let name: String = self.robot.name.chars().filter(|c| !c.is_control()).take(25).collect();
+        let mut name = String::new();
+        for c in self.robot.name.chars().filter(|c| !c.is_control()) {
+            if name.len() + c.len_utf8() > LONGEST_NAME {
+                break;
+            }
+            name.push(c);
+        }
         if name.trim().is_empty() { "hand".into() } else { name }
     }
 
     /// What is guessed, a line a kind.
     pub(super) fn guesses(&self, gains: &Gains) -> Vec<String> {
         let mut guesses = Vec::new();
-        for (i, tip) in self.tips.iter().enumerate() {
-            guesses.push(format!(
-                "fingertip on link `{}`: centre from {}; radius {:?} m from {}",
-                quote(&self.robot.links[tip.link].name),
-                tip.offset_from,
-                self.radii_m[i],
-                tip.radius_from
-            ));
+        match &self.idle[..] {
+            [] => {}
+            [names @ ..] if names.len() <= MOST_NAMES => {
+                guesses.push(format!("held still, as they move no fingertip: {}", names.join(", ")));
+            }
+            names => guesses.push(format!("{} joints, which move no fingertip, are held still", names.len())),
+        }
+        for (tip, radius_m) in self.tips.iter().zip(&self.radii_m) {
+            let mut parts = vec![format!("fingertip on link `{}`", quote(&self.robot.links[tip.link].name))];
+            if tip.offset_from != ASKED {
+                parts.push(format!("its centre: {}", tip.offset_from));
+            }
+            if tip.radius_from != ASKED {
+                parts.push(format!("its radius of {radius_m:?} m: {}", tip.radius_from));
+            }
+            if parts.len() > 1 {
+                guesses.push(parts.join("; "));
+            }
         }
         let joints = |what: &str, is_guessed: &dyn Fn(&Needs) -> bool| {
             let names: Vec<String> = (0..self.needs.len())
@@ -132,6 +161,9 @@ impl<'a> Draft<'a> {
         guesses.extend(joints("speed limits", &|needs| needs.speed));
         guesses.extend(joints("joint limits", &|needs| needs.limits_rad.is_some()));
         guesses.extend(joints("friction", &|needs| needs.friction));
+        if gains.allowed_n.is_some() {
+            guesses.push(format!("force: {}", self.force_rule(gains)));
+        }
         guesses.push(format!(
             "gains: force {:?} N, attitude stiffness {:?} N m, damping; encoders; stiffness of the fingertips",
             gains.force_n, gains.attitude_stiffness_nm
@@ -174,14 +206,14 @@ impl<'a> Draft<'a> {
             let entries: Vec<String> =
                 held.iter().map(|(name, position)| format!("{} = {position:?}", toml_key(name))).collect();
             if !entries.is_empty() {
-                let _ = writeln!(text, "{list} = {{ {} }}", entries.join(", "));
+                let _ = write!(text, "\n[urdf.{list}]\n{}\n", entries.join("\n"));
             }
         }
         let _ = write!(
             text,
             "\n# Of the firmware; a start for the [control] of a scene too.\n\
              [control]\n\
-             # GUESS: half of what the motor of `{}` can press with in the nominal posture, the weight of its links taken off.\n\
+             # GUESS: {}.\n\
              force_n = {:?}\n\
              # GUESS: force_n * radius / {}, as in the paper's experiments (Tables IV and VII).\n\
              attitude_stiffness_nm = {:?}\n\
@@ -202,7 +234,7 @@ impl<'a> Draft<'a> {
              # - damping_gain_nm_s_rad: {}\n\
              # - friction, where the URDF has none that the motor could turn against: dry friction of {:?} of the torque limit (0.0034\n\
              #   in the paper's hand), as much again at full speed; a joint that sticks is damped by a fifth of critical.\n",
-            quote(&self.joint(gains.weakest).name),
+            self.force_rule(gains),
             gains.force_n,
             gains::RADII,
             gains.attitude_stiffness_nm,
@@ -212,12 +244,28 @@ impl<'a> Draft<'a> {
         if self.needs.iter().any(|needs| needs.torque) {
             let _ = writeln!(
                 text,
-                "# - torque_limit_nm, where the URDF has none: {:?} times a finger's weight at the stretched finger's end, and twice the weight of the links.",
+                "# - torque_limit_nm, where the URDF has none: {} times a finger's weight at the stretched finger's end, and twice the weight of the links.",
                 gains::WEIGHTS
             );
         }
         if self.needs.iter().any(|needs| needs.speed) {
             let _ = writeln!(text, "# - speed_limit_rad_s, where the URDF has none: 1.6 turns a second.");
+        }
+    }
+
+    /// What the force follows from.
+    fn force_rule(&self, gains: &Gains) -> String {
+        match gains.allowed_n {
+            Some(allowed) => {
+                let weights = gains::WEIGHTS;
+                format!(
+                    "{weights} times the weight of a finger; the torque limits would allow {allowed} N: are they true?"
+                )
+            }
+            None => format!(
+                "half of what the motor of `{}` can press with in the nominal posture, the weight of its links taken off",
+                quote(&self.joint(gains.weakest).name)
+            ),
         }
     }
 
@@ -251,8 +299,7 @@ impl<'a> Draft<'a> {
         let tip = &self.tips[i];
         let link = toml::Value::String(self.robot.links[tip.link].name.clone());
         let [x, y, z]: [f64; 3] = tip.offset_m.into();
-        let guess =
-            |from: &str| if from == "as asked" { String::new() } else { format!("  # GUESS: {from}") };
+        let guess = |from: &str| if from == ASKED { String::new() } else { format!("  # GUESS: {from}") };
         let _ = write!(
             text,
             "\n[[fingertip]]\n\
