@@ -18,6 +18,8 @@ struct Cli {
 enum Command {
     Sim(commands::sim::Arguments),
     Sweep(commands::sweep::Arguments),
+    Hand(commands::hand::Arguments),
+    Object(commands::object::Arguments),
     Pil(commands::pil::Arguments),
     Flash(commands::flash::Arguments),
     Console(commands::console::Arguments),
@@ -33,6 +35,8 @@ fn main() -> ExitCode {
     let outcome = match Cli::parse().command {
         Command::Sim(arguments) => commands::sim::run(&arguments),
         Command::Sweep(arguments) => commands::sweep::run(&arguments),
+        Command::Hand(arguments) => commands::hand::run(&arguments),
+        Command::Object(arguments) => commands::object::run(&arguments),
         Command::Pil(arguments) => commands::pil::run(&arguments),
         Command::Flash(arguments) => commands::flash::run(&arguments),
         Command::Console(arguments) => commands::console::run(&arguments),

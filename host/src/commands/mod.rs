@@ -3,7 +3,10 @@
 pub(crate) mod console;
 pub(crate) mod export;
 pub(crate) mod flash;
+pub(crate) mod hand;
 pub(crate) mod monitor;
+pub(crate) mod object;
+mod output;
 pub(crate) mod pil;
 mod ports;
 pub(crate) mod record;

@@ -4,7 +4,7 @@ use super::Outcome;
 use anyhow::{Context, bail};
 use blindgrasp::device::interrupt;
 use blindgrasp::record::table::Kind;
-use blindgrasp::scene::{Scene, Setting};
+use blindgrasp::scene::Setting;
 use blindgrasp::sweep::{
     self, Axis, Edge, Identity, Journal, Output, Overview, Plan, Row, Swept, Value, Varied,
 };
@@ -152,12 +152,12 @@ fn plan(arguments: &Arguments) -> anyhow::Result<Plan> {
 
 /// Says what is odd about the scene, or about its seeds.
 fn warn(plan: &Plan) {
-    let Some(file) = plan.first() else { return };
-    for warning in Scene::build(file.clone()).map(|scene| scene.warnings).unwrap_or_default() {
+    let Some(scene) = (0..plan.runs()).find_map(|run| plan.scene(run).ok()) else { return };
+    for warning in &scene.warnings {
         eprintln!("blindgrasp: warning: {warning}");
     }
     let is_varied = plan.axes().iter().any(|axis| axis.key.starts_with("sensors."));
-    let is_noisy = !file.sensors.ideal && file.sensors.noise_counts > 0.0;
+    let is_noisy = !scene.sensors.ideal && scene.sensors.noise_counts > 0.0;
     if plan.seeds() > 1 && !is_varied && !is_noisy {
         eprintln!(
             "blindgrasp: warning: --seeds: the scene has no noise, so that all seeds give the same; set sensors.noise_counts"

@@ -11,6 +11,8 @@ pub mod integrator;
 mod linear;
 pub mod model;
 pub mod polyhedron;
+mod surroundings;
 
+pub use coupling::MAX_CHAIN;
 pub use integrator::Plant;
 pub use model::{ContactForce, Lost, ModelError, Motion, ObjectModel, PlantModel};

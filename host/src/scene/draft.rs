@@ -1,7 +1,7 @@
 //! A scene whose files have been read, before its settings: so that it can be made with many settings, all from the same
 //! files.
 
-use super::error::SceneError;
+use super::error::{Notice, SceneError};
 use super::library::{self, Document, Kind};
 use super::tree::{Node, Setting};
 use super::{Place, Scene, SceneFile, build, read};
@@ -11,11 +11,13 @@ use std::path::Path;
 #[derive(Clone, Debug)]
 pub struct Draft {
     tree: Node,
+    /// What was odd in its files.
+    notices: Vec<Notice>,
 }
 
 impl Draft {
-    /// Reads a scene by its built-in name or by its path, and the hand and the object that it refers to, or that settings
-    /// name instead. Other settings do nothing here.
+    /// Reads a scene by its built-in name or by its path, and all files that it refers to, or that settings have in their
+    /// place: settings whose key [is of files](super::is_of_files) are applied here, all others not yet.
     ///
     /// # Errors
     /// One line: where, which key, what is wrong, what to do.
@@ -26,10 +28,11 @@ impl Draft {
     }
 
     pub(super) fn of(document: Document, settings: &[Setting]) -> Result<Self, SceneError> {
-        Ok(Self { tree: document.follow(settings)? })
+        let mut notices = Vec::new();
+        Ok(Self { tree: document.follow(settings, &mut notices)?, notices })
     }
 
-    /// The effective configuration with settings; those of hand and object do nothing any more. Whether it can be run is not
+    /// The effective configuration with settings; those that are of files do nothing any more. Whether it can be run is not
     /// known yet.
     ///
     /// # Errors
@@ -38,16 +41,18 @@ impl Draft {
         read::read(&self.set(settings)?, "")
     }
 
-    /// The scene with settings; those of hand and object do nothing any more.
+    /// The scene with settings; those that are of files do nothing any more.
     ///
     /// # Errors
     /// One line: where, which key, what is wrong, what to do.
     pub fn scene(&self, settings: &[Setting]) -> Result<Scene, SceneError> {
         let tree = self.set(settings)?;
-        build::scene(read::read(&tree, "")?).map_err(|error| {
+        let mut scene = build::scene(read::read(&tree, "")?).map_err(|error| {
             let place = tree.place_of(&error.key).clone();
             error.at(&place)
-        })
+        })?;
+        scene.warnings.splice(0..0, self.notices.iter().map(Notice::to_string));
+        Ok(scene)
     }
 
     fn set(&self, settings: &[Setting]) -> Result<Node, SceneError> {

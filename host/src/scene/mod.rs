@@ -17,6 +17,7 @@ pub mod file;
 mod hand;
 mod hand_model;
 mod library;
+pub mod mesh;
 mod object;
 pub mod placement;
 mod read;
@@ -25,6 +26,7 @@ mod start;
 #[cfg(test)]
 mod tests;
 mod tree;
+mod urdf;
 
 use crate::plant::contact::{FaceContact, FingertipModel};
 use crate::plant::friction::JointFriction;
@@ -40,11 +42,17 @@ use std::path::Path;
 use tree::Node;
 
 pub use draft::Draft;
-pub use error::{Place, SceneError, suggestion};
+pub(crate) use error::one_line;
+pub use error::{Notice, Place, SceneError, suggestion};
 pub use file::{Actuators, Control, Friction, HandFile, ObjectFile, PlantSettings, SceneFile, Sensors};
+pub(crate) use hand::{moving_masses, posture};
 pub use hand_model::HandModel;
+pub use library::is_of_files;
+pub use object::ObjectBody;
+pub(crate) use object::breaks_triangle;
 pub use source::config_source;
-pub use tree::{Setting, is_reference};
+pub use tree::Setting;
+pub use urdf::{FingertipRequest, Starter, StarterRequest};
 
 /// A scene, checked and ready for the simulator.
 #[derive(Clone, Debug, PartialEq)]
@@ -193,14 +201,48 @@ impl Scene {
 }
 
 impl HandFile {
+    /// Names of the built-in hands.
+    pub fn built_in() -> impl Iterator<Item = &'static str> {
+        Kind::Hand.built_in().iter().map(|(name, _)| *name)
+    }
+
     /// Loads a hand by its built-in name or by its path.
     ///
     /// # Errors
     /// What is wrong with the file as a file; a [`Scene`] checks the numbers.
     pub fn load(name_or_path: &str) -> Result<Self, SceneError> {
-        let mut node = open(Kind::Hand, name_or_path)?;
-        library::complete_hand(&mut node);
-        read::read(&node, "")
+        Self::load_with_places(name_or_path).map(|(file, _)| file)
+    }
+
+    /// The same, with where its values come from.
+    pub(crate) fn load_with_places(name_or_path: &str) -> Result<(Self, Places), SceneError> {
+        Self::from_document(open(Kind::Hand, name_or_path)?)
+    }
+
+    /// Reads a hand from a text; `source` is its name in places.
+    pub(crate) fn parse_with_places(text: &str, source: &str) -> Result<(Self, Places), SceneError> {
+        Self::from_document(Document::parse(text, source, Path::new(""))?)
+    }
+
+    fn from_document(document: Document) -> Result<(Self, Places), SceneError> {
+        let mut notices = Vec::new();
+        let tree = document.complete_hand(&mut notices)?;
+        Ok((read::read(&tree, "")?, Places { tree, notices }))
+    }
+}
+
+/// Where the values of a file come from, and what was odd on the way.
+#[derive(Clone, Debug)]
+pub(crate) struct Places {
+    tree: Node,
+    /// What is odd in the file, or in what it names.
+    pub(crate) notices: Vec<Notice>,
+}
+
+impl Places {
+    /// The place of a key, or that of the nearest thing around it.
+    pub(crate) fn of(&self, key: &str) -> Place {
+        self.tree.place_of(key).clone()
     }
 }
 
@@ -210,12 +252,33 @@ impl ObjectFile {
     /// # Errors
     /// What is wrong with the file as a file; a [`Scene`] checks the numbers.
     pub fn load(name_or_path: &str) -> Result<Self, SceneError> {
-        read::read(&open(Kind::Object, name_or_path)?, "")
+        Self::load_with_notices(name_or_path).map(|(file, _)| file)
+    }
+
+    /// Reads an object from a text. `source` is its name in errors; its mesh is relative to `folder`.
+    ///
+    /// # Errors
+    /// As [`Self::load`].
+    pub fn parse(text: &str, source: &str, folder: &Path) -> Result<Self, SceneError> {
+        read::read(&Document::parse(text, source, folder)?.complete_object(&mut Vec::new())?, "")
+    }
+
+    /// As [`Self::load`], with what its mesh was repaired of.
+    ///
+    /// # Errors
+    /// As [`Self::load`].
+    pub fn load_with_notices(name_or_path: &str) -> Result<(Self, Vec<Notice>), SceneError> {
+        Self::load_with_places(name_or_path).map(|(file, places)| (file, places.notices))
+    }
+
+    /// The same, with where its values come from.
+    pub(crate) fn load_with_places(name_or_path: &str) -> Result<(Self, Places), SceneError> {
+        let mut notices = Vec::new();
+        let tree = open(Kind::Object, name_or_path)?.complete_object(&mut notices)?;
+        Ok((read::read(&tree, "")?, Places { tree, notices }))
     }
 }
 
-fn open(kind: Kind, name_or_path: &str) -> Result<Node, SceneError> {
-    Document::open(kind, name_or_path, Path::new(""))
-        .map(|document| document.node)
-        .map_err(|error| error.at(&Place::whole(name_or_path)))
+fn open(kind: Kind, name_or_path: &str) -> Result<Document, SceneError> {
+    Document::open(kind, name_or_path, Path::new("")).map_err(|error| error.at(&Place::whole(name_or_path)))
 }

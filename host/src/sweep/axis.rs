@@ -166,7 +166,7 @@ impl Range {
         let rises = |pair: &[f64]| if from < to { pair[0] < pair[1] } else { pair[0] > pair[1] };
         if !numbers.windows(2).all(rises) {
             return Err(format!(
-                "there are no {count} values of {DIGITS} digits between {from:?} and {to:?}"
+                "there are no {count} values of {digits} digits between {from:?} and {to:?}"
             ));
         }
         Ok(numbers.into_iter().map(Value::number).collect())

@@ -2,7 +2,7 @@
 
 use super::axis::{Axis, Value};
 use crate::record::table::Kind;
-use crate::scene::{Draft, Scene, SceneError, SceneFile, Setting, is_reference};
+use crate::scene::{Draft, Scene, SceneError, SceneFile, Setting, is_of_files};
 use thiserror::Error;
 
 /// The most runs.
@@ -20,11 +20,11 @@ pub struct Plan {
     seeds: u32,
     /// Runs of the grid; those after these were added.
     grid: usize,
-    /// The scene with each combination of hands and objects that axes name.
+    /// The scene with each combination of files that axes name.
     drafts: Vec<Opened>,
 }
 
-/// A scene with a hand and an object.
+/// A scene with its files.
 #[derive(Clone, Debug)]
 struct Opened {
     draft: Result<Draft, SceneError>,
@@ -88,8 +88,8 @@ impl Plan {
 
     /// Reads the scene's files, and finds out what can be read of them at all.
     fn open(&mut self) {
-        let references = self.axes.iter().filter(|axis| is_reference(&axis.key));
-        let mut drafts = vec![None; references.map(|axis| axis.values.len()).product()];
+        let of_files = self.axes.iter().filter(|axis| is_of_files(&axis.key));
+        let mut drafts = vec![None; of_files.map(|axis| axis.values.len()).product()];
         for run in 0..self.runs() {
             let settings = self.settings_without_seed(run);
             let file = |draft: &Result<Draft, SceneError>| {
@@ -204,8 +204,8 @@ impl Plan {
         firsts.min_by_key(|(run, _)| *run).map(|(_, file)| file)
     }
 
-    /// What the scene's files say, for each hand and object that axes name: an effective configuration, or an error. What
-    /// settings and axes change is in it as the first run has it.
+    /// What the scene's files say, for each combination that axes name: an effective configuration, or an error. What settings
+    /// and axes change is in it as the first run has it.
     pub(super) fn contents(&self) -> Vec<String> {
         let content = |opened: &Opened| match &opened.first {
             Ok((_, file)) => toml::to_string(file).unwrap_or_default(),
@@ -242,8 +242,8 @@ impl Plan {
     }
 
     fn draft_number(&self, run: usize) -> usize {
-        let references = self.axes.iter().zip(self.place(run)).filter(|(axis, _)| is_reference(&axis.key));
-        references.fold(0, |number, (axis, k)| number * axis.values.len() + k)
+        let of_files = self.axes.iter().zip(self.place(run)).filter(|(axis, _)| is_of_files(&axis.key));
+        of_files.fold(0, |number, (axis, k)| number * axis.values.len() + k)
     }
 }
 

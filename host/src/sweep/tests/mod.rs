@@ -46,7 +46,7 @@ fn a_run_is_the_scene_with_its_settings() {
     let refused = plan.scene(3).unwrap_err().to_string();
     assert_eq!(
         refused,
-        "--vary: object: no built-in object is called `cube-2`; did you mean `cube`? (a path has to end in .toml or contain a /)"
+        "--vary: object: no built-in object is called `cube-2`; did you mean `cube`? (a path has to end in .toml or contain a /; of meshes, .stl and .obj are read)"
     );
 }
 
@@ -70,7 +70,7 @@ fn what_no_scene_knows_is_no_sweep() {
         ),
         (
             "object=ball,egg",
-            "--vary: object: no built-in object is called `ball`; known: prism, cube, hexagonal-prism (a path has to end in .toml or contain a /)",
+            "--vary: object: no built-in object is called `ball`; known: prism, cube, hexagonal-prism, cuboid, cuboid-printed, l-bracket, octahedron (a path has to end in .toml or contain a /; of meshes, .stl and .obj are read)",
         ),
     ] {
         assert_eq!(error(&[], &[key], 1), message);
@@ -129,4 +129,20 @@ fn the_files_of_a_scene_are_read_once() {
     assert_eq!(all(), before);
     let names = before.iter().map(|(file, _)| file.as_ref().map_or("", |file| &file.object.name));
     assert_eq!(names.collect::<Vec<_>>(), ["cube", "prism", "cube", "prism"]);
+}
+
+/// A mesh is read when the plan is made, with the values that it is read by.
+#[test]
+fn a_mesh_is_varied_by_what_it_is_read_with() {
+    let plan =
+        plan("l-bracket", &[], &["object.shape.mesh.scale=0.9,1.1", "control.force_n=4,5"], 1).unwrap();
+    let size = |run| {
+        let toml = toml::Value::try_from(plan.file(run).unwrap()).unwrap();
+        let vertices = toml["object"]["shape"]["mesh"]["vertices_m"].as_array().unwrap();
+        let x = vertices.iter().map(|vertex| vertex[0].as_float().unwrap().abs());
+        x.fold(0.0, f64::max)
+    };
+    assert_eq!(size(0), size(1));
+    assert!((size(2) / size(0) - 1.1 / 0.9).abs() < 1e-6, "{} and {}", size(2), size(0));
+    assert_eq!(plan.kind(0), crate::record::table::Kind::Double);
 }

@@ -1,0 +1,48 @@
+//! `blindgrasp hand check`: what a hand is, whether it can be used, and what is wrong with it.
+
+use super::super::Outcome;
+use anyhow::Context;
+use blindgrasp::inspect::finding::Verdict;
+use blindgrasp::inspect::hand::{HandCheck, NominalHand};
+use blindgrasp::report;
+use clap::Args;
+use std::io::{self, Write as _};
+use std::path::PathBuf;
+
+/// Show what a hand is (tree, joints, reach, masses, forces) and find what is wrong with it
+///
+/// Each finding says where, what, and the remedy. An error can't be used, or is wrong whatever the hand is for; a warning is
+/// likely a mistake; a notice is worth knowing.
+///
+/// Exit code 0: no errors; 1: errors were found; 2: the file can't be read, or bad usage.
+#[derive(Args)]
+pub(crate) struct Arguments {
+    /// A built-in hand or the path of a hand's file
+    file: String,
+    /// Print everything as one JSON object
+    #[arg(long)]
+    json: bool,
+    /// Draw the hand at its nominal posture and write the picture (SVG) to this file, which is replaced
+    #[arg(long, value_name = "FILE.svg")]
+    picture: Option<PathBuf>,
+}
+
+/// Runs the command.
+pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
+    let check = HandCheck::load(&arguments.file)?;
+    let text = if arguments.json { serde_json::to_string(&check)? + "\n" } else { check.text() };
+    io::stdout().lock().write_all(text.as_bytes()).context("cannot print the findings")?;
+    if let Some(path) = &arguments.picture {
+        match &check.nominal {
+            Some(NominalHand { hand, joint_names, angles_rad }) => {
+                let svg = report::hand_svg(&check.name, hand, joint_names, angles_rad);
+                std::fs::write(path, svg).with_context(|| format!("cannot write {}", path.display()))?;
+                eprintln!("blindgrasp: wrote {}", path.display());
+            }
+            None => {
+                eprintln!("blindgrasp: no picture: it is not known what sits on what; mend the errors first")
+            }
+        }
+    }
+    Ok(if check.verdict == Verdict::Broken { Outcome::Failed } else { Outcome::Shown })
+}
