@@ -153,13 +153,14 @@ impl Range {
             Scale::Logarithmic => digits((to / from).ln() / (count - 1) as f64),
             _ => MOST_DIGITS,
         };
+        let largest = from.abs().max(to.abs());
         let value = |k: usize| {
             let share = k as f64 / (count - 1) as f64;
             match scale {
                 _ if k == 0 => from,
                 _ if k == count - 1 => to,
                 Scale::Logarithmic => rounded(from.powf(1.0 - share) * to.powf(share), digits),
-                _ => rounded(from * (1.0 - share) + to * share, digits),
+                _ => rounded_as(largest, from * (1.0 - share) + to * share, digits),
             }
         };
         let numbers: Vec<f64> = (0..count).map(value).collect();
@@ -182,6 +183,12 @@ fn digits(step: f64) -> usize {
 /// The nearest number of so many digits.
 fn rounded(number: f64, digits: usize) -> f64 {
     format!("{number:.*e}", digits - 1).parse().unwrap_or(number)
+}
+
+/// The nearest number with the decimals that another has with so many digits: beside it, what should be zero is.
+fn rounded_as(largest: f64, number: f64, digits: usize) -> f64 {
+    let decimals = (digits as f64 - 1.0 - largest.log10().floor()).clamp(0.0, 300.0) as usize;
+    format!("{number:.decimals$}").parse().unwrap_or(number)
 }
 
 /// Splits at commas that are in neither brackets nor quotes.
@@ -225,6 +232,9 @@ mod tests {
         assert_eq!(texts("k.x=0..1:11")[..4], ["0", "0.1", "0.2", "0.3"]);
         assert_eq!(texts("k.x = 0 .. 1 : 3"), ["0", "0.5", "1"]);
         assert_eq!(texts("k.x=1..-1:3"), ["1", "0", "-1"]);
+        assert_eq!(texts("k.x=-0.2..0.4:7"), ["-0.2", "-0.1", "0", "0.1", "0.2", "0.3", "0.4"]);
+        assert_eq!(texts("k.x=-3e-9..3e-9:7")[2..5], ["-1e-9", "0", "1e-9"]);
+        assert_eq!(texts("k.x=-1e12..1e12:3"), ["-1000000000000", "0", "1000000000000"]);
         assert_eq!(texts("k.x=1e-4..1e-1:4:log"), ["0.0001", "0.001", "0.01", "0.1"]);
         assert_eq!(texts("k.x=1e-4..1e-3:5:log"), ["0.0001", "0.0001778", "0.0003162", "0.0005623", "0.001"]);
         assert_eq!(texts("k.x=1..1.1:101:log")[1], "1.000954");
@@ -290,7 +300,7 @@ mod tests {
                 // Even steps, but for the rounding of both: a thousandth of a step, and the twelve digits.
                 let step = if logarithmic { (to / from).ln() } else { to - from } / (count - 1) as f64;
                 let taken = if logarithmic { (pair[1] / pair[0]).ln() } else { pair[1] - pair[0] };
-                let (share, size) = if logarithmic { (2e-3, 1.0) } else { (0.0, pair[0].abs().max(pair[1].abs())) };
+                let (share, size) = if logarithmic { (2e-3, 1.0) } else { (0.0, from.abs().max(to.abs())) };
                 let allowed = share * step.abs() + 2e-11 * size;
                 prop_assert!((taken - step).abs() <= allowed, "step {}: {} for {}", k, taken, step);
             }

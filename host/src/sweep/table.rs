@@ -5,46 +5,70 @@ use super::run::{Outcome, Row};
 use crate::record::table::{Cell, Heading, Kind, Layout};
 use crate::sim::summary::{Last, Summary};
 
-/// A column, but for the name and unit of one that is varied.
-type Described = (&'static str, Kind, &'static str, &'static str);
+/// What a column says of a run that ran, and of each finger at its end.
+type OfSummary = fn(&Summary) -> Cell<'_>;
+type OfFingers = fn(&Last) -> &[f64];
 
-/// What a column says of a run that ran.
+/// A column: name, kind, unit, words, and where its values come from.
+#[derive(Clone, Copy)]
+struct Described<V>(&'static str, Kind, &'static str, &'static str, V);
+
 #[rustfmt::skip]
-const OF_SUMMARY: [(Described, fn(&Summary) -> Cell<'_>); 16] = [
-    (("grasp_held", Kind::Truth, "", "whether every fingertip stayed on its face to the end"), |s| Cell::Truth(s.grasp_held)),
-    (("lost_at_s", Kind::Double, "s", "when the grasp was lost"), |s| double(s.lost_at_s)),
-    (("lost_reason", Kind::Words, "", "why the grasp was lost"), |s| words(s.lost_reason.as_ref())),
-    (("fault", Kind::Words, "", "the fault that the controller ended in"), |s| words(s.fault.as_ref())),
-    (("settled", Kind::Truth, "", "whether everything was at rest in the end"), |s| Cell::Truth(s.settled)),
-    (("settle_time_s", Kind::Double, "s", "the time from which on everything was at rest"), |s| double(s.settle_time_s)),
-    (("duration_s", Kind::Double, "s", "simulated time"), |s| Cell::Double(s.duration_s)),
-    (("friction_demand_max", Kind::Double, "", "largest ratio of tangential to normal force"), |s| Cell::Double(s.friction_demand_max)),
-    (("energy_initial_j", Kind::Double, "J", "energy of Eq. 40 at the start"), |s| Cell::Double(s.energy.initial_j)),
-    (("energy_final_j", Kind::Double, "J", "energy of Eq. 40 at the end"), |s| Cell::Double(s.energy.final_j)),
-    (("energy_increase_max_j", Kind::Double, "J", "the most that it ever rose above an earlier value"), |s| Cell::Double(s.energy.increase_max_j)),
-    (("joint_speed_max_rad_s", Kind::Double, "rad/s", "fastest joint at the end"), |s| Cell::Double(s.last.joint_speed_max_rad_s)),
-    (("object_speed_m_s", Kind::Double, "m/s", "speed of the object at the end"), |s| Cell::Double(s.last.object_speed_m_s)),
-    (("object_spin_rad_s", Kind::Double, "rad/s", "angular speed of the object at the end"), |s| Cell::Double(s.last.object_spin_rad_s)),
-    (("force_residual_n", Kind::Double, "N", "largest residual force of Eq. 38 at the end"), |s| Cell::Double(s.last.force_residual_n)),
-    (("moment_residual_nm", Kind::Double, "N m", "largest residual moment of Eq. 38 at the end"), |s| Cell::Double(s.last.moment_residual_nm)),
+const OF_RUN: [Described<Source>; 2] = [
+    Described("run", Kind::Whole, "", "number of the run, from 1", Source::Run),
+    Described("seed", Kind::Whole, "", "seed of the noise", Source::Seed),
 ];
 
-/// What a column says of a finger at the end.
 #[rustfmt::skip]
-const OF_FINGER: [(Described, fn(&Last) -> &[f64]); 4] = [
-    (("normal_force_n", Kind::Double, "N", "normal force at the end"), |last| &last.normal_force_n),
-    (("desired_normal_force_n", Kind::Double, "N", "the normal force that Eq. 57 asks for at the end"), |last| &last.desired_normal_force_n),
-    (("tangential_force_n", Kind::Double, "N", "tangential force at the end"), |last| &last.tangential_force_n),
-    (("indentation_m", Kind::Double, "m", "indentation at the end"), |last| &last.indentation_m),
+const OF_REFUSAL: Described<Source> =
+    Described("refused", Kind::Words, "", "why the scene refuses the values; nothing was run then", Source::Refused);
+
+#[rustfmt::skip]
+const OF_SUMMARY: [Described<OfSummary>; 16] = [
+    Described("grasp_held", Kind::Truth, "", "whether every fingertip stayed on its face to the end", |s| Cell::Truth(s.grasp_held)),
+    Described("lost_at_s", Kind::Double, "s", "when the grasp was lost", |s| double(s.lost_at_s)),
+    Described("lost_reason", Kind::Words, "", "why the grasp was lost", |s| words(s.lost_reason.as_ref())),
+    Described("fault", Kind::Words, "", "the fault that the controller ended in", |s| words(s.fault.as_ref())),
+    Described("settled", Kind::Truth, "", "whether everything was at rest in the end", |s| Cell::Truth(s.settled)),
+    Described("settle_time_s", Kind::Double, "s", "the time from which on everything was at rest", |s| double(s.settle_time_s)),
+    Described("duration_s", Kind::Double, "s", "simulated time", |s| Cell::Double(s.duration_s)),
+    Described("friction_demand_max", Kind::Double, "", "largest ratio of tangential to normal force", |s| Cell::Double(s.friction_demand_max)),
+    Described("energy_initial_j", Kind::Double, "J", "energy of Eq. 40 at the start", |s| Cell::Double(s.energy.initial_j)),
+    Described("energy_final_j", Kind::Double, "J", "energy of Eq. 40 at the end", |s| Cell::Double(s.energy.final_j)),
+    Described("energy_increase_max_j", Kind::Double, "J", "the most that it ever rose above an earlier value", |s| Cell::Double(s.energy.increase_max_j)),
+    Described("joint_speed_max_rad_s", Kind::Double, "rad/s", "fastest joint at the end", |s| Cell::Double(s.last.joint_speed_max_rad_s)),
+    Described("object_speed_m_s", Kind::Double, "m/s", "speed of the object at the end", |s| Cell::Double(s.last.object_speed_m_s)),
+    Described("object_spin_rad_s", Kind::Double, "rad/s", "angular speed of the object at the end", |s| Cell::Double(s.last.object_spin_rad_s)),
+    Described("force_residual_n", Kind::Double, "N", "largest residual force of Eq. 38 at the end", |s| Cell::Double(s.last.force_residual_n)),
+    Described("moment_residual_nm", Kind::Double, "N m", "largest residual moment of Eq. 38 at the end", |s| Cell::Double(s.last.moment_residual_nm)),
 ];
 
-/// A column.
+#[rustfmt::skip]
+const OF_FINGER: [Described<OfFingers>; 4] = [
+    Described("normal_force_n", Kind::Double, "N", "normal force at the end", |last| &last.normal_force_n),
+    Described("desired_normal_force_n", Kind::Double, "N", "the normal force that Eq. 57 asks for at the end", |last| &last.desired_normal_force_n),
+    Described("tangential_force_n", Kind::Double, "N", "tangential force at the end", |last| &last.tangential_force_n),
+    Described("indentation_m", Kind::Double, "m", "indentation at the end", |last| &last.indentation_m),
+];
+
+#[rustfmt::skip]
+const OF_CONFIGURATION: Described<Source> =
+    Described("configuration", Kind::Words, "", "effective configuration (TOML): a scene that reproduces this run", Source::Configuration);
+
+/// A column of a table.
 struct Column {
     name: String,
     kind: Kind,
     unit: &'static str,
     words: &'static str,
     source: Source,
+}
+
+impl<V> Described<V> {
+    fn column(self, name: impl Fn(&str) -> String, source: impl FnOnce(V) -> Source) -> Column {
+        let Self(own, kind, unit, words, value) = self;
+        Column { name: name(own), kind, unit, words, source: source(value) }
+    }
 }
 
 /// Where a column's values come from.
@@ -54,8 +78,8 @@ enum Source {
     Seed,
     Axis(usize),
     Refused,
-    Summary(fn(&Summary) -> Cell<'_>),
-    Finger(usize, fn(&Last) -> &[f64]),
+    Summary(OfSummary),
+    Finger(usize, OfFingers),
     Configuration,
 }
 
@@ -69,17 +93,8 @@ pub(super) struct Columns<'a> {
 impl<'a> Columns<'a> {
     /// For some rows: there are columns for as many fingers as any of them has.
     pub(super) fn new(plan: &'a Plan, rows: &[Row]) -> Self {
-        let column = |(name, kind, unit, words): Described, source| Column {
-            name: name.to_owned(),
-            kind,
-            unit,
-            words,
-            source,
-        };
-        let mut columns = vec![
-            column(("run", Kind::Whole, "", "number of the run, from 1"), Source::Run),
-            column(("seed", Kind::Whole, "", "seed of the noise"), Source::Seed),
-        ];
+        let mut columns: Vec<Column> =
+            OF_RUN.map(|column| column.column(str::to_owned, |source| source)).into();
         columns.extend(plan.axes().iter().enumerate().map(|(k, axis)| Column {
             name: axis.key.clone(),
             kind: plan.kind(k),
@@ -87,23 +102,15 @@ impl<'a> Columns<'a> {
             words: "varied",
             source: Source::Axis(k),
         }));
-        let refused = ("refused", Kind::Words, "", "why the scene refuses the values; nothing was run then");
-        columns.push(column(refused, Source::Refused));
-        let of_summary = OF_SUMMARY.into_iter();
-        columns.extend(of_summary.map(|(described, value)| column(described, Source::Summary(value))));
-        let fingers =
-            rows.iter().filter_map(Row::summary).map(|summary| summary.last.normal_force_n.len()).max();
-        for finger in 0..fingers.unwrap_or(0) {
-            columns.extend(OF_FINGER.into_iter().map(|((name, kind, unit, words), values)| Column {
-                name: format!("finger_{}.{name}", finger + 1),
-                kind,
-                unit,
-                words,
-                source: Source::Finger(finger, values),
-            }));
+        columns.push(OF_REFUSAL.column(str::to_owned, |source| source));
+        columns.extend(OF_SUMMARY.map(|column| column.column(str::to_owned, Source::Summary)));
+        let fingers = rows.iter().filter_map(Row::summary).map(|summary| summary.last.normal_force_n.len());
+        for finger in 0..fingers.max().unwrap_or(0) {
+            let name = |name: &str| format!("finger_{}.{name}", finger + 1);
+            columns
+                .extend(OF_FINGER.map(|column| column.column(name, |values| Source::Finger(finger, values))));
         }
-        let configuration = "effective configuration (TOML): a scene that reproduces this run";
-        columns.push(column(("configuration", Kind::Words, "", configuration), Source::Configuration));
+        columns.push(OF_CONFIGURATION.column(str::to_owned, |source| source));
         // A key that is varied stands for the column of the same name.
         let is_varied = |column: &Column| plan.axes().iter().any(|axis| axis.key == column.name);
         columns.retain(|column| matches!(column.source, Source::Axis(_)) || !is_varied(column));

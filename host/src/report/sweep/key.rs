@@ -1,6 +1,6 @@
 //! The key at the side of a picture: colours and what they mean.
 
-use super::super::palette::{FAINT_INK, INK, Rgb};
+use super::super::palette::{FAINT_INK, INK};
 use super::super::pens::{LABEL_SIZE, ink, letters, reason};
 use super::super::series;
 use super::ramp::Ramp;
@@ -39,12 +39,13 @@ impl<'a, B: DrawingBackend> Key<'a, B> {
     pub(super) fn ramp(&mut self, heading: &str, ramp: &Ramp) -> Result<(), String> {
         self.words(LEFT, self.y, heading)?;
         let top = self.y + ABOVE_BAR;
-        let (scale, height) = (self.scale, BAR_HEIGHT * self.scale);
+        let scale = self.scale;
         let value = |share: f64| ramp.range.start + (ramp.range.end - ramp.range.start) * share;
-        for row in 0..height {
-            let colour = ramp.colour(value(1.0 - (f64::from(row) + 0.5) / f64::from(height)));
-            let (left, y) = (LEFT * scale, top * scale + row);
-            self.fill((left, y), (left + BAR_WIDTH * scale, y + 1), colour)?;
+        for row in 0..BAR_HEIGHT {
+            let colour = ramp.colour(value(1.0 - (f64::from(row) + 0.5) / f64::from(BAR_HEIGHT)));
+            let corner = |x: i32, y: i32| (x * scale, y * scale);
+            let (from, to) = (corner(LEFT, top + row), corner(LEFT + BAR_WIDTH, top + row + 1));
+            self.area.draw(&Rectangle::new([from, to], ink(colour, 0).filled())).map_err(reason)?;
         }
         let ticks = series::ticks(&ramp.range, 4);
         for &tick in &ticks {
@@ -75,9 +76,5 @@ impl<'a, B: DrawingBackend> Key<'a, B> {
         let style = letters(LABEL_SIZE, self.scale, INK).pos(Pos::new(HPos::Left, VPos::Center));
         let text = Text::new(words, (x * self.scale, y * self.scale), style);
         self.area.draw(&text).map_err(reason)
-    }
-
-    fn fill(&self, from: (i32, i32), to: (i32, i32), colour: Rgb) -> Result<(), String> {
-        self.area.draw(&Rectangle::new([from, to], ink(colour, 0).filled())).map_err(reason)
     }
 }

@@ -2,14 +2,15 @@
 
 use super::super::axes::{Chart, Frame};
 use super::super::drawing::{self, Drawing, TITLE_HEIGHT, WIDTH};
-use super::super::palette::{FAINT_INK, INK, Rgb, WHITE};
+use super::super::palette::{FAINT_INK, INK, Rgb};
 use super::super::pens::{ink, reason};
 use super::key::{self, Key};
 use super::ramp::Ramp;
 use super::variable::{Along, Variable, widest};
 use super::{Files, Mark};
 use plotters::coord::Shift;
-use plotters::prelude::{DrawingArea, DrawingBackend, PathElement, Rectangle};
+use plotters::prelude::{DrawingArea, DrawingBackend, EmptyElement, PathElement, Rectangle};
+use std::ops::Range;
 
 /// Held, and not at rest.
 const MOVING: Rgb = [186, 191, 199];
@@ -18,6 +19,9 @@ const LABELS_HEIGHT: i32 = 44;
 const LEAST_HEIGHT: i32 = 300;
 const MOST_HEIGHT: i32 = 620;
 const FIELD_HEIGHT: i32 = 56;
+/// Half of the cross in a field that was refused, and of a sample in the key.
+const CROSS: i32 = 6;
+const SAMPLE: i32 = 8;
 
 /// A map.
 #[derive(Clone, Debug, PartialEq)]
@@ -162,11 +166,18 @@ impl Field {
                 chart.draw_series([field]).map(|_| ()).map_err(reason)
             }
             Fill::Crossed => {
-                let field = Rectangle::new([low, high], ink(WHITE, 0).filled());
-                chart.draw_series([field]).map_err(reason)?;
+                // As large as in the key, or as the field has place for.
+                let (width, height) = chart.plotting_area().dim_in_pixel();
+                let (across, up) = (chart.x_range(), chart.y_range());
+                let pixels = |half: f64, all: u32, range: Range<f64>| {
+                    half * f64::from(all) / (range.end - range.start)
+                };
+                let place = pixels(dx, width, across).min(pixels(dy, height, up));
+                let half = (0.7 * place).min(f64::from(CROSS * scale)) as i32;
                 let pen = ink(FAINT_INK, scale as u32);
-                let lines = [[low, high], [(low.0, high.1), (high.0, low.1)]];
-                chart.draw_series(lines.map(|line| PathElement::new(line, pen))).map(|_| ()).map_err(reason)
+                let stroke = |rise: i32| PathElement::new([(-half, rise), (half, -rise)], pen);
+                let cross = EmptyElement::at((x, y)) + stroke(half) + stroke(-half);
+                chart.draw_series([cross]).map(|_| ()).map_err(reason)
             }
         }
     }
@@ -208,18 +219,18 @@ impl Colours {
         if let Some(ramp) = &self.lost {
             key.ramp("lost at", ramp)?;
         }
-        let corners = |(x, y): (i32, i32)| {
-            let half = 8 * scale;
+        let corners = |(x, y): (i32, i32), half: i32| {
+            let half = half * scale;
             [(x - half, y - half), (x + half, y + half)]
         };
         if map.has(|mark| matches!(mark, Mark::Moving(_))) {
             key.sample("held, still moving", |area, at| {
-                area.draw(&Rectangle::new(corners(at), ink(MOVING, 0).filled())).map_err(reason)
+                area.draw(&Rectangle::new(corners(at, SAMPLE), ink(MOVING, 0).filled())).map_err(reason)
             })?;
         }
         if map.has(|mark| *mark == Mark::Refused) {
             key.sample("refused", |area, at| {
-                let [low, high] = corners(at);
+                let [low, high] = corners(at, CROSS);
                 let pen = ink(FAINT_INK, scale as u32);
                 area.draw(&PathElement::new([low, high], pen)).map_err(reason)?;
                 area.draw(&PathElement::new([(low.0, high.1), (high.0, low.1)], pen)).map_err(reason)

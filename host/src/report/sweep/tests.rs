@@ -70,6 +70,13 @@ fn nothing_is_clipped(svg: &str) {
     assert!(boxes.len() > 5 && f64::from(LABEL_SIZE) > 0.0);
 }
 
+/// Whether a line goes neither along nor up.
+fn is_slanted(line: &str) -> bool {
+    let points: Vec<(&str, &str)> =
+        attribute(line, "points").split_whitespace().map(|point| point.split_once(',').unwrap()).collect();
+    points.len() == 2 && points[0].0 != points[1].0 && points[0].1 != points[1].1
+}
+
 /// How many rectangles there are of each colour.
 fn colours(svg: &str) -> BTreeMap<&str, usize> {
     let mut colours = BTreeMap::new();
@@ -115,7 +122,9 @@ fn a_map_has_a_field_for_each_run_and_a_border_between_held_and_lost() {
     assert_eq!(grey, 3 + 1, "three that moved, and one in the key");
     let width = |rectangle: &str| number(rectangle, "width");
     let fields = svg.split("<rect").skip(2).filter(|rectangle| width(rectangle) > 200.0).count();
-    assert_eq!(fields, 19, "a field for each run, none where it is not known");
+    assert_eq!(fields, 18, "a field for each run that ran, and none where nothing is known");
+    let slanted = svg.split("<polyline").skip(1).filter(|line| is_slanted(line)).count();
+    assert_eq!(slanted, 2 + 2, "a cross for what was refused, and one in the key");
     // Between the columns twice beside `xx.`, once beside `x/` (nothing is known of `/`); between the rows `x` under `.`.
     let border = svg.split("<polyline").skip(1).filter(|line| attribute(line, "stroke") == "#262A30");
     let (mut upright, mut flat) = (0, 0);
@@ -134,8 +143,8 @@ fn a_map_has_a_field_for_each_run_and_a_border_between_held_and_lost() {
         "held, still moving",
         "refused",
         "0.25",
-        "10⁻⁴",
-        "10⁻¹",
+        "0.0001",
+        "0.1",
     ] {
         assert!(says(&svg, expected), "{expected}");
     }

@@ -132,7 +132,7 @@ pub(super) fn round_powers(range: &Range<f64>) -> Vec<(f64, String)> {
 fn labels(numbers: &[f64]) -> Vec<String> {
     let rounded = numbers.iter().map(|number| format!("{number:.3e}").parse().unwrap_or(*number));
     let rounded: Vec<f64> = rounded.collect();
-    let is_plain = rounded.iter().all(|number| *number == 0.0 || (1e-3..1e5).contains(&number.abs()));
+    let is_plain = rounded.iter().all(|number| *number == 0.0 || (1e-4..1e5).contains(&number.abs()));
     let label = |number: &f64| match format!("{number:e}").split_once('e') {
         Some((digits, power)) if !is_plain && *number != 0.0 => {
             let power = series::power_label(power.parse().unwrap_or(0.0));

@@ -134,8 +134,7 @@ fn the_files_of_a_scene_are_read_once() {
 /// A mesh is read when the plan is made, with the values that it is read by.
 #[test]
 fn a_mesh_is_varied_by_what_it_is_read_with() {
-    let plan =
-        plan("l-bracket", &[], &["object.shape.mesh.scale=1,1.1", "control.force_n=4,5"], 1).unwrap();
+    let plan = plan("l-bracket", &[], &["object.shape.mesh.scale=1,1.1", "control.force_n=4,5"], 1).unwrap();
     let size = |run| {
         let toml = toml::Value::try_from(plan.file(run).unwrap()).unwrap();
         let vertices = toml["object"]["shape"]["mesh"]["vertices_m"].as_array().unwrap();
