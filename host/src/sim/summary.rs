@@ -173,38 +173,29 @@ fn largest(values: impl Iterator<Item = f64>) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use nalgebra::{Matrix3, UnitQuaternion, Vector3};
+    use crate::scene::Scene;
+    use crate::sim::Simulation;
 
-    /// Samples that rest now and then, and whose energy goes up and down.
+    /// Samples of a run, changed so that they rest now and then, and their energy goes up and down.
     fn samples(count: usize, random: &mut fastrand::Rng) -> Vec<Sample> {
-        let mut contact = || ContactSample {
-            normal_force_n: random.f64(),
-            desired_normal_force_n: 1.0,
-            lambda_n: [random.f64(), random.f64() - 0.5],
-            indentation_m: 1e-3,
-            point_m: Vector3::zeros(),
-            frame: Matrix3::identity(),
-            foot_m: [0.0; 2],
-            force_residual_n: Vector3::new(0.1, 0.0, 0.0),
-            moment_residual_nm: Vector3::zeros(),
-        };
-        let contacts: Vec<Vec<ContactSample>> = (0..count).map(|_| vec![contact(), contact()]).collect();
-        let mut sample = |(k, contacts): (usize, Vec<ContactSample>)| Sample {
-            t_s: k as f64 / 1e3,
-            angles_rad: vec![0.0; 3],
-            speeds_rad_s: vec![0.0, if random.u8(..4) == 0 { -2e-3 } else { -9e-4 }, 0.0],
-            estimated_angles_rad: vec![0.0; 3],
-            estimated_speeds_rad_s: vec![0.0; 3],
-            torques_nm: vec![0.0; 3],
-            position_m: Vector3::zeros(),
-            attitude: UnitQuaternion::identity(),
-            velocity_m_s: Vector3::zeros(),
-            spin_rad_s: Vector3::new(0.0, if random.u8(..9) == 0 { 2e-3 } else { 0.0 }, 0.0),
-            contacts,
-            energy_j: random.f64() - 0.5,
-            mode: "grasping",
-        };
-        contacts.into_iter().enumerate().map(&mut sample).collect()
+        let duration = format!("duration_s={:?}", (count - 1) as f64 / 1e3);
+        let scene = Scene::load("prism", &[duration]).unwrap();
+        let mut samples = Simulation::new(&scene).unwrap().run(|_| {}).samples;
+        for sample in &mut samples {
+            sample.speeds_rad_s.fill(0.0);
+            sample.speeds_rad_s[1] = if random.u8(..4) == 0 { -2e-3 } else { -9e-4 };
+            sample.velocity_m_s.fill(0.0);
+            sample.spin_rad_s.fill(0.0);
+            sample.spin_rad_s.y = if random.u8(..9) == 0 { 2e-3 } else { 0.0 };
+            sample.energy_j = random.f64() - 0.5;
+            for contact in &mut sample.contacts {
+                contact.normal_force_n = random.f64();
+                contact.lambda_n = [random.f64(), random.f64() - 0.5];
+                contact.force_residual_n.fill(0.0);
+                contact.force_residual_n.x = 0.1;
+            }
+        }
+        samples
     }
 
     fn summary(samples: &[Sample], lost: Option<(f64, Lost)>) -> Summary {
@@ -220,7 +211,7 @@ mod tests {
         let mut random = fastrand::Rng::with_seed(3);
         let mut settled = 0;
         for round in 0..300 {
-            let samples = samples(1 + round % 40, &mut random);
+            let samples = samples(2 + round % 40, &mut random);
             let summary = summary(&samples, None);
             let (first, last) = (&samples[0], &samples[samples.len() - 1]);
             let is_still = |sample: &Sample| sample.speeds_rad_s[1] > -1e-3 && sample.spin_rad_s.y < 1e-3;

@@ -101,9 +101,10 @@ impl Value {
 
     /// A number. Whole ones are written without a point, so that they serve for keys of either kind.
     pub fn number(number: f64) -> Self {
-        let is_whole = number.fract() == 0.0 && number.abs() < 1e15;
         // Adding zero turns a negative zero into a positive one.
-        let text = if is_whole { format!("{:.0}", number + 0.0) } else { format!("{number:?}") };
+        let number = number + 0.0;
+        let is_whole = number.fract() == 0.0 && number.abs() < 1e15;
+        let text = if is_whole { format!("{number:.0}") } else { format!("{number:?}") };
         Self { text, number: Some(number) }
     }
 }
@@ -233,6 +234,8 @@ mod tests {
         assert_eq!(texts("k.x = 0 .. 1 : 3"), ["0", "0.5", "1"]);
         assert_eq!(texts("k.x=1..-1:3"), ["1", "0", "-1"]);
         assert_eq!(texts("k.x=-0.2..0.4:7"), ["-0.2", "-0.1", "0", "0.1", "0.2", "0.3", "0.4"]);
+        let zero = Axis::parse("k=-0.2..0.4:7").unwrap().values[2].number.unwrap();
+        assert_eq!(zero.to_bits(), 0.0_f64.to_bits(), "no negative zero");
         assert_eq!(texts("k.x=-3e-9..3e-9:7")[2..5], ["-1e-9", "0", "1e-9"]);
         assert_eq!(texts("k.x=-1e12..1e12:3"), ["-1000000000000", "0", "1000000000000"]);
         assert_eq!(texts("k.x=1e-4..1e-1:4:log"), ["0.0001", "0.001", "0.01", "0.1"]);

@@ -105,10 +105,8 @@ impl Curve {
 
     /// Where the grasp is lost, with one run at least: from the middle between a value and its neighbour to the next.
     fn lost(&self, places: &[f64], x: &Ruler) -> Vec<(f64, f64)> {
-        let mut verdicts: Vec<(f64, bool)> = Vec::new();
-        for dot in self.dots.iter().filter(|dot| dot.mark != Mark::Refused) {
-            verdicts.push((places[dot.value], matches!(dot.mark, Mark::Lost(_))));
-        }
+        let is_lost = |dot: &Dot| (places[dot.value], matches!(dot.mark, Mark::Lost(_)));
+        let mut verdicts: Vec<(f64, bool)> = self.dots.iter().map(is_lost).collect();
         verdicts.sort_by(|a, b| a.0.total_cmp(&b.0));
         verdicts.dedup_by(|next, kept| {
             let is_same = next.0 == kept.0;
