@@ -11,13 +11,14 @@
 mod build;
 mod check;
 mod controller;
+mod equilibrium;
 mod error;
 pub mod file;
 mod hand;
 mod hand_model;
+pub mod inverse_kinematics;
 mod library;
 mod object;
-pub mod placement;
 mod read;
 mod source;
 mod start;
@@ -38,6 +39,7 @@ use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 use std::path::Path;
 use tree::{Node, Setting};
 
+pub use equilibrium::equilibrium_indentations;
 pub use error::{Place, SceneError, suggestion};
 pub use file::{Actuators, Control, Friction, HandFile, ObjectFile, PlantSettings, SceneFile, Sensors};
 pub use hand_model::HandModel;

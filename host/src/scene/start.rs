@@ -3,10 +3,11 @@
 use super::{
     Start,
     check::{Result, all_within, fail, item, within},
+    equilibrium::equilibrium_indentations,
     error::{SceneError, suggestion},
     file::{Indentation, PoseFile, SceneFile},
     hand::{posture, rotation},
-    placement,
+    inverse_kinematics,
 };
 use crate::Hand;
 use crate::plant::contact::FaceContact;
@@ -60,7 +61,7 @@ pub(super) fn start(
 ) -> Result<(Vec<FaceContact>, Start)> {
     for name in file.start.trunk_rad.keys() {
         let key = format!("start.trunk_rad.{name}");
-        let trunk = |k: &usize| placement::is_trunk(hand, *k);
+        let trunk = |k: &usize| inverse_kinematics::is_trunk(hand, *k);
         match file.hand.joints.iter().position(|joint| joint.name == *name) {
             Some(k) if trunk(&k) => {
                 let (lower, upper) = hand.range_rad(k);
@@ -98,8 +99,8 @@ pub(super) fn start(
         Indentation::Equilibrium => {
             let stiffnesses: Vec<f64> =
                 file.hand.fingertips.iter().map(|fingertip| fingertip.stiffness_n_m2).collect();
-            placement::equilibrium_indentations(&points, &inwards, &radii, &stiffnesses, file.control.force_n)
-                .or_else(|i| {
+            equilibrium_indentations(&points, &inwards, &radii, &stiffnesses, file.control.force_n).or_else(
+                |i| {
                     fail(
                         format!("contact.{}", i + 1),
                         format!(
@@ -108,7 +109,8 @@ pub(super) fn start(
                         ),
                         "choose faces that look away from the middle of the fingertips",
                     )
-                })?
+                },
+            )?
         }
     };
     for (i, &indentation) in indentations_m.iter().enumerate() {
@@ -130,7 +132,7 @@ pub(super) fn start(
         .iter()
         .map(|joint| file.start.trunk_rad.get(&joint.name).copied().unwrap_or(joint.nominal_rad))
         .collect();
-    let angles_rad = placement::place(hand, &targets, &nominal).map_err(|miss| {
+    let angles_rad = inverse_kinematics::place(hand, &targets, &nominal).map_err(|miss| {
         let limit = match miss.limited_by {
             Some(k) => format!(", with joint `{}` at its limit", file.hand.joints[k].name),
             None => String::new(),
