@@ -18,6 +18,9 @@ use std::error::Error;
 use std::path::{Path, PathBuf};
 use std::{env, fs};
 
+#[path = "src/capacity.rs"]
+mod capacity;
+
 type Result<T> = std::result::Result<T, Box<dyn Error>>;
 
 const CRC: Crc<u32> = Crc::<u32>::new(&CRC_32_ISO_HDLC);
@@ -80,12 +83,20 @@ fn build() -> Result<()> {
 fn load_hand(root: &Path) -> Result<HandModel> {
     println!("cargo::rerun-if-env-changed=HAND");
     let name = env::var("HAND").ok().filter(|name| !name.is_empty()).unwrap_or_else(|| DEFAULT_HAND.into());
-    let path = root.join(&name);
-    if path.is_file() {
-        println!("cargo::rerun-if-changed={}", path.display());
+    for file in HandModel::files(&name) {
+        println!("cargo::rerun-if-changed={}", root.join(file).display());
     }
     let hand = HandModel::load(&name)
         .map_err(|error| format!("HAND={name} (paths are relative to {}): {error}", root.display()))?;
+    let joints = hand.hand.joint_count();
+    if joints > capacity::MOST_JOINTS {
+        return Err(format!(
+            "HAND={name}: the hand has {joints} joints, and the board has counters and outputs for {}: \
+             without firmware, `blindgrasp sim` and `blindgrasp serve` run it",
+            capacity::MOST_JOINTS
+        )
+        .into());
+    }
     for warning in &hand.warnings {
         println!("cargo::warning=HAND={name}: {warning}");
     }

@@ -880,10 +880,10 @@ class Qemu:
     """The image `pil` in QEMU, over two named pipes; it ends when they are closed."""
 
     def __init__(self, image):
-        if shutil.which("qemu-system-arm") is None:
-            raise BadInput("qemu-system-arm is not installed, or not in PATH")
         if not os.path.isfile(image):
             raise BadInput(f"there is no image {image}")
+        if shutil.which("qemu-system-arm") is None:
+            raise BadInput("qemu-system-arm is not installed, or not in PATH")
         self.folder = tempfile.TemporaryDirectory(prefix="blindgrasp-")
         to, self.source = (os.path.join(self.folder.name, name) for name in ("to", "from"))
         os.mkfifo(to)

@@ -20,6 +20,7 @@
 #![allow(unsafe_code)]
 
 use crate::bus::{Device, SharedBus};
+use crate::capacity::MOST_JOINTS;
 use crate::joints::dac::{self, CHANNELS};
 use crate::joints::ls7366r::{self, FilterClock};
 use crate::joints::{BoardJoints, JointsConfig, OutputConfig};
@@ -71,11 +72,10 @@ const FILTER_CLOCK: FilterClock = FilterClock::Half;
 /// 10 V are then 1.39 N m, the most that the motor can do (hand file: 1.3878 N m).
 const NM_PER_VOLT: f32 = 1.1 * 23.4e-3 * 5.4;
 
-/// Joints that the board has counters and outputs for.
-pub const MOST_JOINTS: usize = 16;
 const MOST_DACS: usize = MOST_JOINTS / CHANNELS;
 /// DACs that this hand needs.
 const DACS: usize = JOINTS.div_ceil(CHANNELS);
+// build.rs has said so before, in words.
 const _: () = assert!(JOINTS <= MOST_JOINTS, "the hand has more joints than the board has counters for");
 
 type Counter = Device<'static, Spi<SPI1>, Select, Wait>;

@@ -13,6 +13,7 @@ pub type Posture = blindgrasp_shared::hand::Posture<f64, MAX_JOINTS, MAX_FINGERS
 
 #[cfg(feature = "command")]
 pub mod device;
+pub mod inspect;
 #[cfg(feature = "command")]
 pub mod monitor;
 pub mod plant;

@@ -17,6 +17,7 @@ struct Cli {
 #[derive(Subcommand)]
 enum Command {
     Sim(commands::sim::Arguments),
+    Hand(commands::hand::Arguments),
     Pil(commands::pil::Arguments),
     Flash(commands::flash::Arguments),
     Console(commands::console::Arguments),
@@ -31,6 +32,7 @@ enum Command {
 fn main() -> ExitCode {
     let outcome = match Cli::parse().command {
         Command::Sim(arguments) => commands::sim::run(&arguments),
+        Command::Hand(arguments) => commands::hand::run(&arguments),
         Command::Pil(arguments) => commands::pil::run(&arguments),
         Command::Flash(arguments) => commands::flash::run(&arguments),
         Command::Console(arguments) => commands::console::run(&arguments),

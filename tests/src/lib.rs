@@ -13,6 +13,7 @@
 //! - [`polyhedra`]: random convex polyhedra, and scenes in which the hand grasps them.
 //! - [`supervised`]: a simulated hand whose controller is watched, with things that go wrong.
 //! - [`thumb`]: what the functions of an image for the microcontroller call, and how much stack they take.
+//! - [`urdf`]: random URDFs, and their kinematics and dynamics link by link.
 
 #[cfg(all(unix, feature = "firmware"))]
 pub mod board;
@@ -30,3 +31,4 @@ pub mod polyhedra;
 pub mod random;
 pub mod supervised;
 pub mod thumb;
+pub mod urdf;

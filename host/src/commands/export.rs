@@ -1,12 +1,12 @@
 //! `blindgrasp export`: a recording as a table.
 
 use super::Outcome;
+use super::output::create;
 use super::recording::{Span, chosen_device, damage_of, reading_bar, start_ns};
-use anyhow::{Context, bail};
+use anyhow::Context;
 use blindgrasp::record::export::{ExportError, Exported, Format, Request, export};
 use blindgrasp::record::mcap::Recording;
 use clap::{Args, ValueEnum};
-use std::fs::OpenOptions;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
@@ -86,21 +86,6 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
         eprintln!("blindgrasp: {}: {words}", arguments.file.display());
     }
     Ok(if is_whole { Outcome::Shown } else { Outcome::Failed })
-}
-
-fn create(path: &Path, force: bool) -> anyhow::Result<std::fs::File> {
-    let mut options = OpenOptions::new();
-    options.write(true);
-    let options = if force { options.create(true).truncate(true) } else { options.create_new(true) };
-    match options.open(path) {
-        Err(error) if error.kind() == io::ErrorKind::AlreadyExists => {
-            bail!(
-                "{}: is there already; choose another with --out, or overwrite it with --force",
-                path.display()
-            )
-        }
-        opened => opened.with_context(|| format!("cannot write {}", path.display())),
-    }
 }
 
 /// Whether the reader of stdout has seen enough.

@@ -3,7 +3,9 @@
 pub(crate) mod console;
 pub(crate) mod export;
 pub(crate) mod flash;
+pub(crate) mod hand;
 pub(crate) mod monitor;
+mod output;
 pub(crate) mod pil;
 mod ports;
 pub(crate) mod record;

@@ -20,7 +20,7 @@ use std::path::PathBuf;
 /// Exit code 0: the grasp held; 1: it was lost; 2: bad input or usage.
 #[derive(Args)]
 pub(crate) struct Arguments {
-    /// A built-in scene (prism, cube, prism-ideal, cube-ideal, cube-normal-only, two-finger-prism) or the path of a scene file
+    #[arg(help = scene_help())]
     scene: String,
     /// Write summary, effective scene, trace, plots, pictures, an animation and a recording to this directory; if the name ends in .mcap, write the recording alone, to this file
     #[arg(long, value_name = "DIR|FILE.mcap")]
@@ -37,6 +37,11 @@ pub(crate) struct Arguments {
     /// Change a value of the scene, such as control.force_n=4 (may be repeated)
     #[arg(long = "set", value_name = "KEY=VALUE")]
     settings: Vec<String>,
+}
+
+fn scene_help() -> String {
+    let names: Vec<&str> = Scene::built_in().collect();
+    format!("A built-in scene ({}) or the path of a scene file", names.join(", "))
 }
 
 /// Runs the command.

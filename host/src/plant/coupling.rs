@@ -21,7 +21,7 @@ use blindgrasp_shared::math::Real;
 use nalgebra::Matrix3;
 
 /// The most joints that a finger, or the trunk, may have.
-pub(super) const MAX_CHAIN: usize = 8;
+pub const MAX_CHAIN: usize = 8;
 /// Velocities of the object.
 const OBJECT: usize = 6;
 /// What fingers share: the trunk's joints, then the object.

@@ -12,5 +12,6 @@ mod linear;
 pub mod model;
 pub mod polyhedron;
 
+pub use coupling::MAX_CHAIN;
 pub use integrator::Plant;
 pub use model::{ContactForce, Lost, ModelError, Motion, ObjectModel, PlantModel};

@@ -21,6 +21,11 @@ impl Place {
     pub fn whole(source: &str) -> Self {
         Self { source: source.into(), line: 0 }
     }
+
+    /// Whether it is in a file, and not on the command line.
+    pub(super) fn is_in_a_file(&self) -> bool {
+        *self.source != *"--set"
+    }
 }
 
 impl fmt::Display for Place {
@@ -69,20 +74,42 @@ impl SceneError {
         if !self.remedy.is_empty() {
             line = line + "; " + &self.remedy;
         }
-        // Keys and names come from files and may contain anything, at any length.
-        let mut clean = String::new();
-        for c in line.chars() {
-            if clean.len() > LONGEST_LINE {
-                return clean + " ...";
-            }
-            if c.is_control() {
-                clean.extend(c.escape_debug());
-            } else {
-                clean.push(c);
-            }
-        }
-        clean
+        one_line(&line)
     }
+}
+
+/// What is odd in a file but can be used. One line: `file:line: what; remedy`.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Notice {
+    /// Where.
+    pub place: Place,
+    /// What is odd.
+    pub what: String,
+    /// What to do.
+    pub remedy: String,
+}
+
+impl fmt::Display for Notice {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { place, what, remedy } = self;
+        f.write_str(&one_line(&format!("{place}: {what}; {remedy}")))
+    }
+}
+
+/// A text without control characters, cut where it is too long: keys and names come from files and may contain anything.
+pub(crate) fn one_line(text: &str) -> String {
+    let mut clean = String::new();
+    for c in text.chars() {
+        if clean.len() > LONGEST_LINE {
+            return clean + " ...";
+        }
+        if c.is_control() {
+            clean.extend(c.escape_debug());
+        } else {
+            clean.push(c);
+        }
+    }
+    clean
 }
 
 /// `did you mean ...`, or everything there is.

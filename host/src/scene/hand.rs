@@ -18,6 +18,38 @@ use nalgebra::{DMatrix, Quaternion, SymmetricEigen, UnitQuaternion, Vector3};
 
 /// Checks a hand and prepares it.
 pub(super) fn hand(file: &HandFile, warnings: &mut Vec<String>) -> Result<Hand> {
+    let tree = tree(file)?;
+    for (k, joint) in file.joints.iter().enumerate() {
+        let key = |name: &str| item("hand.joint", k, name);
+        check_joint(joint, &key)?;
+        if breaks_triangle(&tensor(&key("inertia_kg_m2"), &joint.inertia_kg_m2)?) {
+            warnings.push(format!(
+                "link `{}`: its inertia is that of no body: one moment is larger than the sum of the two others",
+                joint.name
+            ));
+        }
+    }
+    for (i, fingertip) in file.fingertips.iter().enumerate() {
+        check_fingertip(fingertip, &|name| item("hand.fingertip", i, name))?;
+    }
+    prepare(file, &tree)
+}
+
+/// The kinematics and masses of a hand, whatever size its numbers have: for those who look into what is wrong with it.
+pub(super) fn kinematics(file: &HandFile) -> Result<Hand> {
+    prepare(file, &tree(file)?)
+}
+
+/// What sits on what, by index.
+struct Tree {
+    /// Of each joint.
+    parents: Vec<Option<usize>>,
+    /// Of each fingertip.
+    links: Vec<usize>,
+}
+
+/// Follows the names.
+fn tree(file: &HandFile) -> Result<Tree> {
     // The shared crate checks this too, but not before the lists below have been searched for names.
     let (joints, fingertips) = (file.joints.len(), file.fingertips.len());
     let wrong_count = if joints == 0 {
@@ -49,21 +81,23 @@ pub(super) fn hand(file: &HandFile, warnings: &mut Vec<String>) -> Result<Hand> 
             suggestion(name, file.joints.iter().map(|joint| joint.name.as_str())),
         ),
     };
+    let parent = |(k, joint): (usize, &JointFile)| match &joint.parent {
+        Some(name) => find(item("hand.joint", k, "parent"), name, k).map(Some),
+        None => Ok(None),
+    };
+    let link =
+        |(i, tip): (usize, &FingertipFile)| find(item("hand.fingertip", i, "link"), &tip.link, usize::MAX);
+    Ok(Tree {
+        parents: file.joints.iter().enumerate().map(parent).collect::<Result<_>>()?,
+        links: file.fingertips.iter().enumerate().map(link).collect::<Result<_>>()?,
+    })
+}
+
+/// Hands the numbers to the shared crate.
+fn prepare(file: &HandFile, tree: &Tree) -> Result<Hand> {
     let mut joints = Vec::with_capacity(file.joints.len());
-    for (k, joint) in file.joints.iter().enumerate() {
-        let key = |name: &str| item("hand.joint", k, name);
-        let parent = match &joint.parent {
-            Some(name) => Some(find(key("parent"), name, k)?),
-            None => None,
-        };
-        check_joint(joint, &key)?;
-        let inertia_kg_m2 = tensor(&key("inertia_kg_m2"), &joint.inertia_kg_m2)?;
-        if breaks_triangle(&inertia_kg_m2) {
-            warnings.push(format!(
-                "link `{}`: its inertia is that of no body: one moment is larger than the sum of the two others",
-                joint.name
-            ));
-        }
+    for (k, (joint, &parent)) in file.joints.iter().zip(&tree.parents).enumerate() {
+        let inertia_kg_m2 = tensor(&item("hand.joint", k, "inertia_kg_m2"), &joint.inertia_kg_m2)?;
         joints.push(Joint {
             parent,
             offset_m: joint.offset_m.into(),
@@ -74,27 +108,20 @@ pub(super) fn hand(file: &HandFile, warnings: &mut Vec<String>) -> Result<Hand> 
             link: Link { mass_kg: joint.mass_kg, mass_centre_m: joint.mass_centre_m.into(), inertia_kg_m2 },
         });
     }
-    let mut fingertips = Vec::with_capacity(file.fingertips.len());
-    for (i, fingertip) in file.fingertips.iter().enumerate() {
-        let key = |name| item("hand.fingertip", i, name);
-        let link = find(key("link"), &fingertip.link, usize::MAX)?;
-        all_within(&key("offset_m"), &fingertip.offset_m, 10.0)?;
-        within(&key("radius_m"), fingertip.radius_m, 1e-5, 1.0)?;
-        within(&key("stiffness_n_m2"), fingertip.stiffness_n_m2, 1.0, 1e13)?;
-        within(&key("damping_n_s_m_per_m2"), fingertip.damping_n_s_m_per_m2, 0.0, 1e12)?;
-        within(
-            &key("torsional_damping_nm_s_rad_per_m2"),
-            fingertip.torsional_damping_nm_s_rad_per_m2,
-            0.0,
-            1e12,
-        )?;
-        fingertips.push(Fingertip {
-            link,
-            offset_m: fingertip.offset_m.into(),
-            radius_m: fingertip.radius_m,
-        });
-    }
+    let tips = file.fingertips.iter().zip(&tree.links);
+    let fingertips: Vec<Fingertip<f64>> = tips
+        .map(|(tip, &link)| Fingertip { link, offset_m: tip.offset_m.into(), radius_m: tip.radius_m })
+        .collect();
     Hand::new(&joints, &fingertips).map_err(|error| hand_error(file, error))
+}
+
+fn check_fingertip(fingertip: &FingertipFile, key: &dyn Fn(&str) -> String) -> Result<()> {
+    all_within(&key("offset_m"), &fingertip.offset_m, 10.0)?;
+    within(&key("radius_m"), fingertip.radius_m, 1e-5, 1.0)?;
+    within(&key("stiffness_n_m2"), fingertip.stiffness_n_m2, 1.0, 1e13)?;
+    within(&key("damping_n_s_m_per_m2"), fingertip.damping_n_s_m_per_m2, 0.0, 1e12)?;
+    let torsion = fingertip.torsional_damping_nm_s_rad_per_m2;
+    within(&key("torsional_damping_nm_s_rad_per_m2"), torsion, 0.0, 1e12)
 }
 
 fn check_joint(joint: &JointFile, key: &dyn Fn(&str) -> String) -> Result<()> {
@@ -203,7 +230,7 @@ pub(super) fn rotation(rpy_rad: [f64; 3]) -> UnitQuaternion<f64> {
 }
 
 /// Where everything is for given joint angles.
-pub(super) fn posture(hand: &Hand, angles: &[f64]) -> Posture {
+pub(crate) fn posture(hand: &Hand, angles: &[f64]) -> Posture {
     let mut padded = [0.0; MAX_JOINTS];
     for (padded, angle) in padded.iter_mut().zip(angles) {
         *padded = *angle;
@@ -214,7 +241,7 @@ pub(super) fn posture(hand: &Hand, angles: &[f64]) -> Posture {
 }
 
 /// Every combination of joint speeds has to move mass: the integrator divides by the mass matrix.
-pub(super) fn moving_masses(file: &HandFile, hand: &Hand, angles: &[f64]) -> Result<()> {
+pub(crate) fn moving_masses(file: &HandFile, hand: &Hand, angles: &[f64]) -> Result<()> {
     let count = hand.joint_count();
     let posture = posture(hand, angles);
     let mut mass = DMatrix::<f64>::zeros(count, count);

@@ -5,16 +5,15 @@ use super::{
     build::control,
     check::{Result, fail, name},
     controller::Setup,
-    error::{Place, SceneError},
+    error::{Notice, Place, SceneError},
     file::{Actuators, HandFile, PlantSettings, SCHEMA, Sensors},
-    hand::hand,
-    library::{Document, Kind, complete_hand},
-    read::read,
+    hand::{hand, kinematics},
+    library::{Document, Kind, is_path},
     source::{IMPORTS, Source, config_source},
 };
 use crate::{Hand, MAX_JOINTS};
 use blindgrasp_shared::tick::{Config, Params};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// How long the host's heartbeat may fail while the hand has torque, ms.
 const HEARTBEAT_MS: u32 = 250;
@@ -65,18 +64,20 @@ impl HandModel {
         Self::from_document(Document::parse(text, source, Path::new(""))?).map(|(model, _)| model)
     }
 
+    /// The files on the disk that a hand is read from: its own, and its URDF. As far as they can be told; none for a hand
+    /// built in.
+    pub fn files(name_or_path: &str) -> Vec<PathBuf> {
+        if !is_path(name_or_path) {
+            return Vec::new();
+        }
+        let document = Document::open(Kind::Hand, name_or_path, Path::new(""));
+        let urdf = document.ok().and_then(|document| document.urdf_path());
+        std::iter::once(name_or_path.into()).chain(urdf).collect()
+    }
+
     fn from_document(document: Document) -> std::result::Result<(Self, HandFile), SceneError> {
-        let mut tree = document.node;
-        complete_hand(&mut tree);
-        let file: HandFile = read(&tree, "")?;
-        let model = Self::build(&file).map_err(|mut error| {
-            // The checks know the keys of a scene.
-            if let Some(key) = error.key.strip_prefix("hand.") {
-                error.key = key.into();
-            }
-            let place = tree.place_of(&error.key).clone();
-            error.at(&place)
-        })?;
+        let (file, mut model, notices) = checked(document, Self::build)?;
+        model.warnings.splice(0..0, notices.iter().map(Notice::to_string));
         Ok((model, file))
     }
 
@@ -94,15 +95,9 @@ impl HandModel {
         crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC).checksum(self.source().as_bytes())
     }
 
-    fn build(file: &HandFile) -> Result<Self> {
-        if file.schema != SCHEMA {
-            return fail(
-                "schema",
-                format!("{} is a format that this program does not know", file.schema),
-                format!("write it as format {SCHEMA}"),
-            );
-        }
-        name("name", &file.name)?;
+    pub(crate) fn build(file: &HandFile) -> Result<Self> {
+        let mut warnings = Vec::new();
+        let hand = file.prepare(&mut warnings)?;
         let Some(gains) = &file.control else {
             return fail(
                 "control",
@@ -110,9 +105,6 @@ impl HandModel {
                 "add a table [control] with the keys that a scene's has: force_n, attitude_stiffness_nm, ...",
             );
         };
-        control(gains)?;
-        let mut warnings = Vec::new();
-        let hand = hand(file, &mut warnings)?;
         let setup = Setup {
             joints: &file.joints,
             control: gains,
@@ -160,4 +152,60 @@ pub static CONFIG: Config<f32, JOINTS> = {};
             config_source(&self.config, count),
         )
     }
+}
+
+impl HandFile {
+    /// Loads a hand by its built-in name or by its path, checks it, and prepares its kinematics; with what is odd in it, in
+    /// words. Unlike a [`HandModel`], it may do without `[control]`.
+    ///
+    /// # Errors
+    /// One line: where, which key, what is wrong, what to do.
+    pub fn load_checked(name_or_path: &str) -> std::result::Result<(Self, Hand, Vec<String>), SceneError> {
+        let document = Document::open(Kind::Hand, name_or_path, Path::new(""));
+        let document = document.map_err(|error| error.at(&Place::whole(name_or_path)))?;
+        let mut warnings = Vec::new();
+        let (file, hand, notices) = checked(document, |file| file.prepare(&mut warnings))?;
+        warnings.splice(0..0, notices.iter().map(Notice::to_string));
+        Ok((file, hand, warnings))
+    }
+
+    /// Checks all that every hand needs, and prepares it. A firmware needs the table `[control]` as well.
+    pub(crate) fn prepare(&self, warnings: &mut Vec<String>) -> Result<Hand> {
+        if self.schema != SCHEMA {
+            return fail(
+                "schema",
+                format!("{} is a format that this program does not know", self.schema),
+                format!("write it as format {SCHEMA}"),
+            );
+        }
+        name("name", &self.name)?;
+        self.control.as_ref().map_or(Ok(()), control)?;
+        hand(self, warnings).map_err(as_of_hand)
+    }
+
+    /// The kinematics and masses, whatever size the numbers have: for those who look into what is wrong with a hand.
+    pub(crate) fn kinematics(&self) -> Result<Hand> {
+        kinematics(self).map_err(as_of_hand)
+    }
+}
+
+/// Reads a hand and checks it; what is wrong gets its place.
+fn checked<T>(
+    document: Document,
+    check: impl FnOnce(&HandFile) -> Result<T>,
+) -> Result<(HandFile, T, Vec<Notice>)> {
+    let (file, places) = HandFile::from_document(document)?;
+    let found = check(&file).map_err(|error| {
+        let place = places.of(&error.key);
+        error.at(&place)
+    })?;
+    Ok((file, found, places.notices))
+}
+
+/// The checks know the keys of a scene.
+fn as_of_hand(mut error: SceneError) -> SceneError {
+    if let Some(key) = error.key.strip_prefix("hand.") {
+        error.key = key.into();
+    }
+    error
 }

@@ -1,9 +1,11 @@
 //! Where files come from: built into the program, or from the disk.
 
 use super::{
-    error::{Place, SceneError, suggestion},
+    error::{Notice, Place, SceneError, suggestion},
     tree::{Node, Setting, Value},
+    urdf,
 };
+use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 
 /// No file of ours comes close; something else was named by mistake.
@@ -36,35 +38,97 @@ impl Kind {
     pub(super) fn built_in(self) -> &'static [(&'static str, &'static str)] {
         match self {
             Self::Scene => {
-                built_in!("scenes": "prism" "cube" "prism-ideal" "cube-ideal" "cube-normal-only" "two-finger-prism")
+                built_in!("scenes":
+                    "prism" "cube" "prism-ideal" "cube-ideal" "cube-normal-only"
+                    "hand-arm" "hand-arm-consistent" "hand-arm-firm"
+                    "two-finger-prism" "four-finger-cube" "allegro-like-prism"
+                )
             }
-            Self::Hand => built_in!("hands": "three-finger" "two-finger"),
-            Self::Object => built_in!("objects": "prism" "cube" "hexagonal-prism"),
+            Self::Hand => {
+                built_in!("hands": "three-finger" "hand-arm" "two-finger" "four-finger" "allegro-like")
+            }
+            Self::Object => built_in!("objects": "prism" "cube" "hexagonal-prism" "cuboid" "cuboid-printed"),
         }
     }
 }
 
-/// A parsed file and the folder that its references are relative to.
+/// URDFs that hands built in name, by the names of their files.
+const BUILT_IN_URDFS: &[(&str, &str)] = &[
+    #[cfg(test)]
+    ("gripper.urdf", include_str!("urdf/tests/gripper.urdf")),
+];
+
+/// What the references of a file are relative to.
+#[derive(Clone, Debug)]
+pub(super) enum Home {
+    /// The program itself.
+    BuiltIn,
+    /// A folder.
+    Folder(PathBuf),
+}
+
+impl Home {
+    fn folder(&self) -> &Path {
+        match self {
+            Self::BuiltIn => Path::new(""),
+            Self::Folder(folder) => folder,
+        }
+    }
+
+    /// The text of the URDF that a hand names, and its name in errors.
+    pub(super) fn urdf(
+        &self,
+        file: &str,
+        named_at: &Place,
+    ) -> Result<(Cow<'static, str>, String), SceneError> {
+        if let (Self::BuiltIn, true) = (self, named_at.is_in_a_file()) {
+            return match BUILT_IN_URDFS.iter().find(|(name, _)| *name == file) {
+                Some((name, text)) => Ok((Cow::Borrowed(text), format!("hands/{name}"))),
+                None => Err(SceneError::new("", "is not built in", "name it by its path")),
+            };
+        }
+        let path = self.resolve(file, named_at);
+        Ok((read_text(&path, ".urdf")?.into(), path.to_string_lossy().into_owned()))
+    }
+
+    /// The path of a file that is named somewhere.
+    fn resolve(&self, file: &str, named_at: &Place) -> PathBuf {
+        if named_at.is_in_a_file() { self.folder().join(file) } else { file.into() }
+    }
+}
+
+/// A parsed file, and what its references are relative to.
 pub(super) struct Document {
     pub(super) node: Node,
-    folder: PathBuf,
+    pub(super) home: Home,
 }
 
 impl Document {
     /// Parses a text.
     pub(super) fn parse(text: &str, source: &str, folder: &Path) -> Result<Self, SceneError> {
-        Ok(Self { node: Node::parse(text, source)?, folder: folder.into() })
+        Ok(Self { node: Node::parse(text, source)?, home: Home::Folder(folder.into()) })
     }
 
     /// Finds and parses something by its built-in name, or by its path, which ends in `.toml` or contains a separator.
     pub(super) fn open(kind: Kind, name: &str, folder: &Path) -> Result<Self, SceneError> {
-        if name.ends_with(".toml") || name.contains(['/', '\\']) {
+        if kind == Kind::Hand && name.ends_with(".urdf") {
+            let remedy = format!("`blindgrasp hand new {name}` writes a hand's file that names it");
+            return Err(SceneError::new(
+                "",
+                "a URDF alone is no hand: it has no fingertips and gains",
+                remedy,
+            ));
+        }
+        if is_path(name) {
             let path = folder.join(name);
-            let text = read_text(&path)?;
+            let text = read_text(&path, ".toml")?;
             return Self::parse(&text, &path.to_string_lossy(), path.parent().unwrap_or(folder));
         }
         match kind.built_in().iter().find(|(built_in, _)| *built_in == name) {
-            Some((_, text)) => Self::parse(text, &format!("{}s/{name}.toml", kind.word()), Path::new("")),
+            Some((_, text)) => Ok(Self {
+                node: Node::parse(text, &format!("{}s/{name}.toml", kind.word()))?,
+                home: Home::BuiltIn,
+            }),
             None => Err(SceneError::new(
                 "",
                 format!("no built-in {} is called `{name}`", kind.word()),
@@ -74,27 +138,36 @@ impl Document {
         }
     }
 
-    /// Applies settings, follows the references of a scene, and fills in the defaults of its hand. Settings of what a
-    /// reference names come before it is followed, all others after.
-    pub(super) fn complete_scene(mut self, settings: &[Setting]) -> Result<Node, SceneError> {
+    /// Applies settings, follows the references of a scene, and fills in the URDF and the defaults of its hand. Settings of
+    /// what a reference names come before it is followed, all others after.
+    pub(super) fn complete_scene(
+        mut self,
+        settings: &[Setting],
+        notices: &mut Vec<Notice>,
+    ) -> Result<Node, SceneError> {
         let is_reference = |setting: &&Setting| setting.key == "hand" || setting.key == "object";
+        let is_of_urdf = |setting: &&Setting| setting.key.starts_with("hand.urdf.");
         for setting in settings.iter().filter(is_reference) {
             self.node.set(setting)?;
         }
         for (key, kind) in [("hand", Kind::Hand), ("object", Kind::Object)] {
             let Some(node) = self.node.get_mut(key) else { continue };
+            let mut home = self.home.clone();
             if let Value::String(name) = &node.value {
-                let from_command_line = *node.place.source == *"--set";
-                let folder = if from_command_line { Path::new("") } else { self.folder.as_path() };
-                *node = Self::open(kind, name, folder)
-                    .map_err(|error| error.of_reference(key, &node.place))?
-                    .node;
+                let folder = if node.place.is_in_a_file() { self.home.folder() } else { Path::new("") };
+                let document =
+                    Self::open(kind, name, folder).map_err(|error| error.of_reference(key, &node.place))?;
+                (*node, home) = (document.node, document.home);
             }
             if kind == Kind::Hand {
-                complete_hand(node);
+                for setting in settings.iter().filter(is_of_urdf) {
+                    self.node.set(setting)?;
+                }
+                let Some(hand) = self.node.get_mut(key) else { continue };
+                complete_hand(hand, &home, notices).map_err(|error| error.below(key))?;
             }
         }
-        for setting in settings.iter().filter(|setting| !is_reference(setting)) {
+        for setting in settings.iter().filter(|setting| !is_reference(setting) && !is_of_urdf(setting)) {
             if let Some(key) = setting.key.strip_prefix("hand.control") {
                 let (problem, remedy) = ("acts in the firmware only", format!("set control{key}"));
                 return Err(SceneError::new(&setting.key, problem, remedy).at(&Place::whole("--set")));
@@ -103,15 +176,40 @@ impl Document {
         }
         Ok(self.node)
     }
+
+    /// A hand's tree, with its URDF and its defaults filled in.
+    pub(super) fn complete_hand(self, notices: &mut Vec<Notice>) -> Result<Node, SceneError> {
+        let Self { mut node, home } = self;
+        complete_hand(&mut node, &home, notices)?;
+        Ok(node)
+    }
+
+    /// The path of the URDF that a hand's file names, if it does and is not built in.
+    pub(super) fn urdf_path(&self) -> Option<PathBuf> {
+        match (&self.home, urdf::file_of(&self.node)) {
+            (Home::Folder(_), Some(Node { value: Value::String(file), place })) => {
+                Some(self.home.resolve(file, place))
+            }
+            _ => None,
+        }
+    }
 }
 
-/// Spreads the defaults of a hand.
-pub(super) fn complete_hand(node: &mut Node) {
-    node.spread_defaults("joint");
+/// Whether a name is that of a file, and not of something built in.
+pub(super) fn is_path(name: &str) -> bool {
+    name.ends_with(".toml") || name.contains(['/', '\\'])
+}
+
+/// Fills in a hand's URDF, and spreads its defaults.
+fn complete_hand(node: &mut Node, home: &Home, notices: &mut Vec<Notice>) -> Result<(), SceneError> {
     node.spread_defaults("fingertip");
+    urdf::expand(node, home, notices)?;
+    node.spread_defaults("joint");
+    Ok(())
 }
 
-fn read_text(path: &Path) -> Result<String, SceneError> {
+/// Reads a file of a kind.
+fn read_text(path: &Path, ending: &str) -> Result<String, SceneError> {
     let place = Place::whole(&path.to_string_lossy());
     let fail = |problem: String, remedy: &str| SceneError::new("", problem, remedy).at(&place);
     let unreadable = |error: std::io::Error| {
@@ -124,7 +222,7 @@ fn read_text(path: &Path) -> Result<String, SceneError> {
     };
     let metadata = std::fs::metadata(path).map_err(unreadable)?;
     if !metadata.is_file() {
-        return Err(fail("not a file".into(), "name a .toml file"));
+        return Err(fail("not a file".into(), &format!("name a {ending} file")));
     }
     if metadata.len() > LARGEST_FILE {
         return Err(fail(format!("{} MiB are too many", metadata.len() >> 20), "check the path"));
@@ -141,13 +239,21 @@ fn read_text(path: &Path) -> Result<String, SceneError> {
 
 impl SceneError {
     /// What keeps a whole file from being read is an error of what names it.
-    fn of_reference(self, key: &str, place: &Place) -> Self {
+    pub(super) fn of_reference(self, key: &str, place: &Place) -> Self {
         let problem = match &self.place {
             None => self.problem,
             Some(file) if file.line == 0 => format!("`{file}`: {}", self.problem),
             Some(_) => return self,
         };
         Self::new(key, problem, self.remedy).at(place)
+    }
+
+    /// Of a part of something larger.
+    fn below(mut self, key: &str) -> Self {
+        if !self.key.is_empty() {
+            self.key = format!("{key}.{}", self.key);
+        }
+        self
     }
 
     fn at_line(mut self, line: usize) -> Self {

@@ -25,6 +25,7 @@ mod start;
 #[cfg(test)]
 mod tests;
 mod tree;
+mod urdf;
 
 use crate::plant::contact::{FaceContact, FingertipModel};
 use crate::plant::friction::JointFriction;
@@ -40,9 +41,12 @@ use std::path::Path;
 use tree::{Node, Setting};
 
 pub use equilibrium::equilibrium_indentations;
-pub use error::{Place, SceneError, suggestion};
+pub(crate) use error::one_line;
+pub use error::{Notice, Place, SceneError, suggestion};
 pub use file::{Actuators, Control, Friction, HandFile, ObjectFile, PlantSettings, SceneFile, Sensors};
+pub(crate) use hand::{moving_masses, posture};
 pub use hand_model::HandModel;
+pub(crate) use object::breaks_triangle;
 pub use source::config_source;
 
 /// A scene, checked and ready for the simulator.
@@ -148,12 +152,15 @@ impl Scene {
 
     fn from_document(document: Document, settings: &[String]) -> Result<Self, SceneError> {
         let settings = settings.iter().map(|text| Setting::parse(text)).collect::<Result<Vec<_>, _>>()?;
-        let tree = document.complete_scene(&settings)?;
+        let mut notices = Vec::new();
+        let tree = document.complete_scene(&settings, &mut notices)?;
         let file = read::read(&tree, "")?;
-        build::scene(file).map_err(|error| {
+        let mut scene = build::scene(file).map_err(|error| {
             let place = tree.place_of(&error.key).clone();
             error.at(&place)
-        })
+        })?;
+        scene.warnings.splice(0..0, notices.iter().map(Notice::to_string));
+        Ok(scene)
     }
 
     /// Checks and prepares a scene that was put together in code.
@@ -197,14 +204,48 @@ impl Scene {
 }
 
 impl HandFile {
+    /// Names of the built-in hands.
+    pub fn built_in() -> impl Iterator<Item = &'static str> {
+        Kind::Hand.built_in().iter().map(|(name, _)| *name)
+    }
+
     /// Loads a hand by its built-in name or by its path.
     ///
     /// # Errors
     /// What is wrong with the file as a file; a [`Scene`] checks the numbers.
     pub fn load(name_or_path: &str) -> Result<Self, SceneError> {
-        let mut node = open(Kind::Hand, name_or_path)?;
-        library::complete_hand(&mut node);
-        read::read(&node, "")
+        Self::load_with_places(name_or_path).map(|(file, _)| file)
+    }
+
+    /// The same, with where its values come from.
+    pub(crate) fn load_with_places(name_or_path: &str) -> Result<(Self, Places), SceneError> {
+        Self::from_document(open(Kind::Hand, name_or_path)?)
+    }
+
+    /// Reads a hand from a text; `source` is its name in places.
+    pub(crate) fn parse_with_places(text: &str, source: &str) -> Result<(Self, Places), SceneError> {
+        Self::from_document(Document::parse(text, source, Path::new(""))?)
+    }
+
+    fn from_document(document: Document) -> Result<(Self, Places), SceneError> {
+        let mut notices = Vec::new();
+        let tree = document.complete_hand(&mut notices)?;
+        Ok((read::read(&tree, "")?, Places { tree, notices }))
+    }
+}
+
+/// Where the values of a file come from, and what was odd on the way.
+#[derive(Clone, Debug)]
+pub(crate) struct Places {
+    tree: Node,
+    /// What is odd in the file, or in what it names.
+    pub(crate) notices: Vec<Notice>,
+}
+
+impl Places {
+    /// The place of a key, or that of the nearest thing around it.
+    pub(crate) fn of(&self, key: &str) -> Place {
+        self.tree.place_of(key).clone()
     }
 }
 
@@ -214,12 +255,10 @@ impl ObjectFile {
     /// # Errors
     /// What is wrong with the file as a file; a [`Scene`] checks the numbers.
     pub fn load(name_or_path: &str) -> Result<Self, SceneError> {
-        read::read(&open(Kind::Object, name_or_path)?, "")
+        read::read(&open(Kind::Object, name_or_path)?.node, "")
     }
 }
 
-fn open(kind: Kind, name_or_path: &str) -> Result<Node, SceneError> {
-    Document::open(kind, name_or_path, Path::new(""))
-        .map(|document| document.node)
-        .map_err(|error| error.at(&Place::whole(name_or_path)))
+fn open(kind: Kind, name_or_path: &str) -> Result<Document, SceneError> {
+    Document::open(kind, name_or_path, Path::new("")).map_err(|error| error.at(&Place::whole(name_or_path)))
 }

@@ -115,7 +115,7 @@ pub(super) fn tensor(key: &str, file: &InertiaFile) -> Result<Matrix3<f64>> {
 }
 
 /// Whether a principal moment is larger than the sum of the two others.
-pub(super) fn breaks_triangle(inertia: &Matrix3<f64>) -> bool {
+pub(crate) fn breaks_triangle(inertia: &Matrix3<f64>) -> bool {
     let moments = SymmetricEigen::new(*inertia).eigenvalues;
     2.0 * moments.max() > moments.sum() * (1.0 + 1e-6)
 }

@@ -34,8 +34,7 @@ pub(super) struct Entry {
 impl Node {
     /// Parses a document.
     pub(super) fn parse(text: &str, source: &str) -> Result<Self, SceneError> {
-        let breaks = text.bytes().enumerate().filter(|(_, byte)| *byte == b'\n').map(|(at, _)| at).collect();
-        let lines = Lines { source: Place::whole(source), breaks };
+        let lines = Lines::new(text, source);
         let document = DeTable::parse(text).map_err(|error| {
             SceneError::new("", format!("not TOML: {}", error.message()), "see https://toml.io")
                 .at(&lines.place(error.span().map_or(0, |span| span.start)))
@@ -69,6 +68,14 @@ impl Node {
     }
 
     /// The value of a key, if this is a table that has it.
+    pub(super) fn get(&self, key: &str) -> Option<&Self> {
+        match &self.value {
+            Value::Table(entries) => entries.iter().find(|entry| entry.key == key).map(|entry| &entry.node),
+            _ => None,
+        }
+    }
+
+    /// The value of a key, if this is a table that has it.
     pub(super) fn get_mut(&mut self, key: &str) -> Option<&mut Self> {
         match &mut self.value {
             Value::Table(entries) => {
@@ -78,16 +85,38 @@ impl Node {
         }
     }
 
+    /// An item of a list, if this is one that has it.
+    pub(super) fn item_mut(&mut self, index: usize) -> Option<&mut Self> {
+        match &mut self.value {
+            Value::Array(items) => items.get_mut(index),
+            _ => None,
+        }
+    }
+
+    /// Gives a table a key that it does not have, in the place of its value.
+    pub(super) fn insert(&mut self, key: &str, node: Self) {
+        if let Value::Table(entries) = &mut self.value {
+            entries.push(Entry { key: key.into(), place: node.place.clone(), node });
+        }
+    }
+
+    /// Takes a key out of a table.
+    pub(super) fn take(&mut self, key: &str) -> Option<Entry> {
+        let Value::Table(entries) = &mut self.value else { return None };
+        let index = entries.iter().position(|entry| entry.key == key)?;
+        Some(entries.remove(index))
+    }
+
     /// Takes a table `<list>_defaults` out of this table and gives its entries to those tables of the array `<list>` that
     /// lack them.
     pub(super) fn spread_defaults(&mut self, list: &str) {
-        let Value::Table(entries) = &mut self.value else { return };
         let name = format!("{list}_defaults");
-        let Some(index) = entries.iter().position(|entry| entry.key == name) else { return };
-        if !matches!(entries[index].node.value, Value::Table(_)) {
+        if !matches!(self.get(&name), Some(Self { value: Value::Table(_), .. })) {
             return; // Not a table: stays, and is reported as an unknown key.
         }
-        let Value::Table(defaults) = entries.remove(index).node.value else { return };
+        let Some(Entry { node: Self { value: Value::Table(defaults), .. }, .. }) = self.take(&name) else {
+            return;
+        };
         let Some(Value::Array(items)) = self.get_mut(list).map(|node| &mut node.value) else { return };
         for item in items {
             if let Value::Table(own) = &mut item.value {
@@ -199,15 +228,31 @@ impl Setting {
 }
 
 /// From byte positions to lines.
-struct Lines {
+pub(super) struct Lines {
     source: Place,
     /// Where the lines end, bytes.
     breaks: Vec<usize>,
 }
 
 impl Lines {
-    fn place(&self, position: usize) -> Place {
-        let line = 1 + self.breaks.partition_point(|&end| end < position);
+    /// Of a text; `source` is its name in errors.
+    pub(super) fn new(text: &str, source: &str) -> Self {
+        let breaks = text.bytes().enumerate().filter(|(_, byte)| *byte == b'\n').map(|(at, _)| at).collect();
+        Self { source: Place::whole(source), breaks }
+    }
+
+    /// The text as a whole.
+    pub(super) fn whole(&self) -> &Place {
+        &self.source
+    }
+
+    /// The place of a byte.
+    pub(super) fn place(&self, position: usize) -> Place {
+        self.line(1 + self.breaks.partition_point(|&end| end < position))
+    }
+
+    /// A line, from 1.
+    pub(super) fn line(&self, line: usize) -> Place {
         Place { line, ..self.source.clone() }
     }
 

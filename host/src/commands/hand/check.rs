@@ -1,0 +1,31 @@
+//! `blindgrasp hand check`: what a hand is, whether it can be used, and what is wrong with it.
+
+use super::super::Outcome;
+use anyhow::Context;
+use blindgrasp::inspect::finding::Verdict;
+use blindgrasp::inspect::hand::HandCheck;
+use clap::Args;
+use std::io::{self, Write as _};
+
+/// Show what a hand is (tree, joints, reach, masses, forces) and find what is wrong with it
+///
+/// Each finding says where, what, and the remedy. An error can't be used, or is wrong whatever the hand is for; a warning is
+/// likely a mistake; a notice is worth knowing.
+///
+/// Exit code 0: no errors; 1: errors were found; 2: the file can't be read, or bad usage.
+#[derive(Args)]
+pub(crate) struct Arguments {
+    /// A built-in hand or the path of a hand's file
+    file: String,
+    /// Print everything as one JSON object
+    #[arg(long)]
+    json: bool,
+}
+
+/// Runs the command.
+pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
+    let check = HandCheck::load(&arguments.file)?;
+    let text = if arguments.json { serde_json::to_string(&check)? + "\n" } else { check.text() };
+    io::stdout().lock().write_all(text.as_bytes()).context("cannot print the findings")?;
+    Ok(if check.verdict == Verdict::Broken { Outcome::Failed } else { Outcome::Shown })
+}

@@ -1,0 +1,201 @@
+//! What the URDF knows of a joint, as keys of its entry.
+//!
+//! A key comes from the joint's own `[[joint]]`, else from the URDF, else from `[joint_defaults]`.
+
+use super::super::check::Result;
+use super::super::error::{Notice, Place, SceneError};
+use super::super::tree::{Node, Value};
+use super::expand::Parts;
+use super::robot::{Joint, Kind};
+use super::xml::quote;
+use nalgebra::Matrix3;
+use std::f64::consts::PI;
+
+/// Torques, N m, and speeds, rad/s, from which on a limit is taken for a placeholder.
+const PLACEHOLDER: f64 = 1000.0;
+
+/// Adds to the entry of a joint what the URDF says and the entry does not. `is_default` tells whether `[joint_defaults]` has a
+/// key, `parent_key` is that of the entry's parent.
+///
+/// # Errors
+/// Something is missing in all three, or contradicts the tree.
+pub(super) fn complete(
+    parts: &Parts<'_>,
+    node: &mut Node,
+    index: usize,
+    parent_key: &str,
+    is_default: &dyn Fn(&str) -> bool,
+    notices: &mut Vec<Notice>,
+) -> Result<()> {
+    let moving = &parts.assembly.joints[index];
+    let joint = parts.joint(moving);
+    let parent = moving.parent.map(|index| parts.name(index));
+    set_parent(node, joint, parent, parent_key)?;
+
+    let body_place = &parts.robot.links[joint.child].body_place;
+    let body = &moving.body;
+    let mut add = |key: &str, value: Node| {
+        if node.get(key).is_none() {
+            node.insert(key, value);
+        }
+    };
+    add("offset_m", list(&moving.offset_m, &joint.origin.place));
+    add("rotation_rpy_rad", list(&moving.rpy_rad, &joint.origin.place));
+    add("axis", list(&joint.axis.into(), &joint.axis_place));
+    add("mass_kg", number(body.mass_kg, body_place));
+    add("mass_centre_m", list(&body.centre_m.into(), body_place));
+    add("inertia_kg_m2", list(&moments(&body.inertia_kg_m2), body_place));
+    let dynamics = &joint.dynamics;
+    let damping = parts.keys.heeded("damping", dynamics.damping);
+    let friction = parts.keys.heeded("friction", dynamics.friction);
+    for (key, value) in [("viscous_friction_nm_s_rad", damping), ("coulomb_friction_nm", friction)] {
+        if let Some(value) = value {
+            add(key, number(value, &dynamics.place));
+        }
+    }
+
+    set_range(node, joint, is_default, notices)?;
+    let limit = &joint.limit;
+    for (key, attribute, given, unit) in [
+        ("torque_limit_nm", "effort", limit.effort, "N m"),
+        ("speed_limit_rad_s", "velocity", limit.velocity, "rad/s"),
+    ] {
+        if node.get(key).is_some() {
+            continue;
+        }
+        // A joint that may not push or not move is one whose limit nobody knew.
+        match parts.keys.heeded(attribute, given).filter(|value| *value > 0.0) {
+            Some(value) => {
+                notices.extend(placeholder(joint, key, attribute, value, unit));
+                node.insert(key, number(value, &limit.place));
+            }
+            None if is_default(key) => {}
+            None => {
+                let problem = match given {
+                    None => format!("<limit> has no {attribute}"),
+                    Some(value) if value > 0.0 => format!("{attribute} is to be ignored"),
+                    Some(_) => format!("{attribute} is 0"),
+                };
+                return Err(lacking(joint, &problem, key).at(&limit.place));
+            }
+        }
+    }
+    if let (Some(friction), Some(Value::Float(torque))) =
+        (friction, node.get("torque_limit_nm").map(|node| &node.value))
+        && !(friction < *torque)
+    {
+        notices.push(Notice {
+            place: dynamics.place.clone(),
+            what: format!(
+                "{}: its friction of {friction:?} N m is more than its motor can turn against",
+                of(joint)
+            ),
+            remedy: "if it is a placeholder, add `ignore = [\"friction\", \"damping\"]` to [urdf]".into(),
+        });
+    }
+    for key in ["damping_gain_nm_s_rad", "encoder_counts_per_turn"] {
+        if node.get(key).is_none() && !is_default(key) {
+            return Err(
+                lacking(joint, &format!("no `{key}`, of which URDF knows nothing"), key).at(&node.place)
+            );
+        }
+    }
+    Ok(())
+}
+
+fn of(joint: &Joint) -> String {
+    format!("joint `{}`", quote(&joint.name))
+}
+
+/// The error that a key is given nowhere.
+fn lacking(joint: &Joint, problem: &str, key: &str) -> SceneError {
+    let remedy = format!("give `{key}` in [joint_defaults], or in its [[joint]]");
+    SceneError::new("", format!("{}: {problem}", of(joint)), remedy)
+}
+
+/// The joint that carries a joint; the file may say it too, but not otherwise.
+fn set_parent(node: &mut Node, joint: &Joint, parent: Option<&str>, key: &str) -> Result<()> {
+    match (node.get("parent"), parent) {
+        (None, None) => Ok(()),
+        (None, Some(parent)) => {
+            node.insert("parent", text(parent, &joint.place));
+            Ok(())
+        }
+        (Some(Node { value: Value::String(own), .. }), Some(parent)) if own == parent => Ok(()),
+        (Some(own), parent) => {
+            let problem = match parent {
+                Some(parent) => format!("is `{}` in the URDF", quote(parent)),
+                None => "is the base in the URDF".into(),
+            };
+            Err(SceneError::new(key, problem, "leave it out").at(&own.place))
+        }
+    }
+}
+
+/// Lower and upper end stop.
+fn set_range(
+    node: &mut Node,
+    joint: &Joint,
+    is_default: &dyn Fn(&str) -> bool,
+    notices: &mut Vec<Notice>,
+) -> Result<()> {
+    let key = "limits_rad";
+    if node.get(key).is_some() {
+        return Ok(());
+    }
+    let place = &joint.limit.place;
+    let [lower, upper] = match (joint.kind, joint.limit.lower, joint.limit.upper) {
+        (Kind::Continuous, ..) | (_, None, None) if is_default(key) => return Ok(()),
+        (Kind::Continuous, ..) => {
+            notices.push(Notice {
+                place: joint.place.clone(),
+                what: format!("{} is continuous: its limits are taken as -pi and pi", of(joint)),
+                remedy: format!("give `{key}` in its [[joint]]"),
+            });
+            [-PI, PI]
+        }
+        (_, None, None) => return Err(lacking(joint, "no limits", key).at(place)),
+        // What is left out is zero, says URDF.
+        (_, lower, upper) => [lower.unwrap_or(0.0), upper.unwrap_or(0.0)],
+    };
+    if !(lower < upper) {
+        let problem = format!("{}: lower ({lower:?}) is not below upper ({upper:?})", of(joint));
+        let remedy = format!("correct <limit>, or give `{key}` in its [[joint]]");
+        return Err(SceneError::new("", problem, remedy).at(place));
+    }
+    // Zero, the nominal angle of a joint that says nothing, would be refused.
+    if !(lower <= 0.0 && upper >= 0.0) && node.get("nominal_rad").is_none() && !is_default("nominal_rad") {
+        node.insert("nominal_rad", number(0.5 * (lower + upper), place));
+    }
+    node.insert(key, list(&[lower, upper], place));
+    Ok(())
+}
+
+fn placeholder(joint: &Joint, key: &str, attribute: &str, value: f64, unit: &str) -> Option<Notice> {
+    (value >= PLACEHOLDER).then(|| Notice {
+        place: joint.limit.place.clone(),
+        what: format!("{}: {attribute} of {value:?} {unit} looks like a placeholder", of(joint)),
+        remedy: format!("if so, give `{key}` in [joint_defaults] and `ignore = [\"{attribute}\"]` in [urdf]"),
+    })
+}
+
+/// Moments and products as a hand's file has them.
+fn moments(inertia: &Matrix3<f64>) -> [f64; 6] {
+    let i = inertia;
+    [i.m11, i.m22, i.m33, i.m12, i.m13, i.m23]
+}
+
+fn number(value: f64, place: &Place) -> Node {
+    Node { value: Value::Float(value), place: place.clone() }
+}
+
+/// A string.
+pub(super) fn text(value: &str, place: &Place) -> Node {
+    Node { value: Value::String(value.into()), place: place.clone() }
+}
+
+/// An array of numbers.
+pub(super) fn list<const N: usize>(values: &[f64; N], place: &Place) -> Node {
+    let items = values.iter().map(|&value| number(value, place)).collect();
+    Node { value: Value::Array(items), place: place.clone() }
+}

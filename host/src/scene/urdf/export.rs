@@ -1,0 +1,210 @@
+//! A hand as a URDF: links with their masses, joints, fingertips as spheres, and bones that viewers can show.
+//!
+//! Numbers have the fewest digits that give back every bit, so that the hand can be read again as it was. Each joint's link is
+//! called after it; each fingertip is a link of its own, fixed where the fingertip's centre is. What URDF knows nothing of
+//! (gains, encoders, stiffness of the fingertips) is left out.
+
+use super::super::file::{FingertipFile, HandFile, InertiaFile, JointFile};
+use nalgebra::Vector3;
+use std::fmt::Write as _;
+
+/// Bones are this much thinner than long, ...
+const SLENDERNESS: f64 = 0.15;
+/// ... and thinner than the fingertips by this factor.
+const THINNER: f64 = 0.7;
+/// Shorter bones are not drawn, m.
+const SHORTEST_BONE_M: f64 = 1e-4;
+/// Mass, kg, and moments of inertia, kg m^2, of a link that has none of its own. PyBullet (3.2.7) takes one kilogram where
+/// nothing is said, and MuJoCo (4.0) refuses moving bodies of less than 1e-15.
+const NEXT_TO_NOTHING: f64 = 1e-14;
+/// Name of the link that is the base frame.
+const BASE: &str = "base";
+
+impl HandFile {
+    /// The hand as a URDF that other tools load. It is the same hand when it is read again.
+    pub fn to_urdf(&self) -> String {
+        Export::of(self).write()
+    }
+}
+
+struct Export<'a> {
+    hand: &'a HandFile,
+    /// Names of the joints' links, in the hand's order.
+    links: Vec<String>,
+    /// Names of the fingertips' links.
+    tips: Vec<String>,
+    text: String,
+}
+
+impl<'a> Export<'a> {
+    fn of(hand: &'a HandFile) -> Self {
+        // Names of links must differ from each other, and some readers want them to differ from those of joints.
+        let mut taken: Vec<String> = hand.joints.iter().map(|joint| joint.name.clone()).collect();
+        taken.push(BASE.into());
+        let mut unused = |wanted: String| {
+            let mut name = wanted;
+            while taken.contains(&name) {
+                name.push('_');
+            }
+            taken.push(name.clone());
+            name
+        };
+        Self {
+            hand,
+            links: hand.joints.iter().map(|joint| unused(format!("{}-link", joint.name))).collect(),
+            tips: hand.fingertips.iter().map(|tip| unused(format!("{}-tip", tip.name))).collect(),
+            text: String::new(),
+        }
+    }
+
+    fn write(mut self) -> String {
+        let version = env!("CARGO_PKG_VERSION");
+        self.line(0, "<?xml version=\"1.0\"?>".into());
+        self.line(0, format!("<!-- Written by blindgrasp {version}. -->"));
+        self.line(0, format!("<robot name=\"{}\">", escaped(&self.hand.name)));
+        self.line(1, "<material name=\"bone\"><color rgba=\"0.75 0.75 0.78 1\"/></material>".into());
+        self.line(1, "<material name=\"fingertip\"><color rgba=\"0.85 0.45 0.25 1\"/></material>".into());
+        self.base();
+        let hand = self.hand;
+        for (k, joint) in hand.joints.iter().enumerate() {
+            self.link(k, joint);
+            self.joint(k, joint);
+        }
+        for (i, tip) in hand.fingertips.iter().enumerate() {
+            self.fingertip(i, tip);
+        }
+        self.line(0, "</robot>".into());
+        self.text
+    }
+
+    fn line(&mut self, depth: usize, text: String) {
+        let _ = writeln!(self.text, "{:width$}{text}", "", width = 2 * depth);
+    }
+
+    /// The link of a joint by the joint's name; the base without one.
+    fn link_name(&self, joint: Option<&str>) -> String {
+        let index = joint.and_then(|name| self.hand.joints.iter().position(|joint| joint.name == name));
+        escaped(index.map_or(BASE, |index| &self.links[index]))
+    }
+
+    fn base(&mut self) {
+        let bones = self.bones(None);
+        if bones.is_empty() {
+            self.line(1, format!("<link name=\"{BASE}\"/>"));
+        } else {
+            self.line(1, format!("<link name=\"{BASE}\">"));
+            self.visuals(&bones);
+            self.line(1, "</link>".into());
+        }
+    }
+
+    fn link(&mut self, k: usize, joint: &JointFile) {
+        self.line(1, format!("<link name=\"{}\">", escaped(&self.links[k])));
+        self.inertial(joint.mass_kg, &joint.mass_centre_m, &moments(&joint.inertia_kg_m2));
+        let bones = self.bones(Some(&joint.name));
+        self.visuals(&bones);
+        self.line(1, "</link>".into());
+    }
+
+    fn inertial(&mut self, mass_kg: f64, centre_m: &[f64; 3], moments: &[f64; 6]) {
+        let is_massless = mass_kg == 0.0 && moments.iter().all(|moment| *moment == 0.0);
+        let (mass_kg, [xx, yy, zz, xy, xz, yz]) = if is_massless {
+            let moment = NEXT_TO_NOTHING;
+            (NEXT_TO_NOTHING, [moment, moment, moment, 0.0, 0.0, 0.0])
+        } else {
+            (mass_kg, *moments)
+        };
+        let inertia = format!(
+            "<inertia ixx=\"{xx:?}\" ixy=\"{xy:?}\" ixz=\"{xz:?}\" iyy=\"{yy:?}\" iyz=\"{yz:?}\" izz=\"{zz:?}\"/>"
+        );
+        self.line(2, "<inertial>".into());
+        self.line(3, format!("<origin xyz=\"{}\"/>", numbers(centre_m)));
+        self.line(3, format!("<mass value=\"{mass_kg:?}\"/>"));
+        self.line(3, inertia);
+        self.line(2, "</inertial>".into());
+    }
+
+    fn joint(&mut self, k: usize, joint: &JointFile) {
+        let [lower, upper] = joint.limits_rad;
+        let lines = [
+            format!("<parent link=\"{}\"/>", self.link_name(joint.parent.as_deref())),
+            format!("<child link=\"{}\"/>", escaped(&self.links[k])),
+            format!(
+                "<origin xyz=\"{}\" rpy=\"{}\"/>",
+                numbers(&joint.offset_m),
+                numbers(&joint.rotation_rpy_rad)
+            ),
+            format!("<axis xyz=\"{}\"/>", numbers(&joint.axis)),
+            format!(
+                "<limit lower=\"{lower:?}\" upper=\"{upper:?}\" effort=\"{:?}\" velocity=\"{:?}\"/>",
+                joint.torque_limit_nm, joint.speed_limit_rad_s
+            ),
+            format!(
+                "<dynamics damping=\"{:?}\" friction=\"{:?}\"/>",
+                joint.viscous_friction_nm_s_rad, joint.coulomb_friction_nm
+            ),
+        ];
+        self.line(1, format!("<joint name=\"{}\" type=\"revolute\">", escaped(&joint.name)));
+        lines.into_iter().for_each(|line| self.line(2, line));
+        self.line(1, "</joint>".into());
+    }
+
+    fn fingertip(&mut self, i: usize, tip: &FingertipFile) {
+        let name = escaped(&self.tips[i]);
+        let sphere = format!("<geometry><sphere radius=\"{:?}\"/></geometry>", tip.radius_m);
+        let parent = self.link_name(Some(&tip.link));
+        self.line(1, format!("<link name=\"{name}\">"));
+        self.inertial(0.0, &[0.0; 3], &[0.0; 6]);
+        self.line(2, format!("<visual>{sphere}<material name=\"fingertip\"/></visual>"));
+        self.line(2, format!("<collision>{sphere}</collision>"));
+        self.line(1, "</link>".into());
+        self.line(1, format!("<joint name=\"{name}-joint\" type=\"fixed\">"));
+        self.line(2, format!("<parent link=\"{parent}\"/>"));
+        self.line(2, format!("<child link=\"{name}\"/>"));
+        self.line(2, format!("<origin xyz=\"{}\"/>", numbers(&tip.offset_m)));
+        self.line(1, "</joint>".into());
+    }
+
+    /// Where the bones of a link end: at the joints and fingertips that sit on it.
+    fn bones(&self, link: Option<&str>) -> Vec<Vector3<f64>> {
+        let joints = self.hand.joints.iter().filter(|joint| joint.parent.as_deref() == link);
+        let tips = self.hand.fingertips.iter().filter(|tip| Some(tip.link.as_str()) == link);
+        let ends = joints.map(|joint| joint.offset_m).chain(tips.map(|tip| tip.offset_m));
+        ends.map(Vector3::from).filter(|end| end.norm() >= SHORTEST_BONE_M).collect()
+    }
+
+    fn visuals(&mut self, bones: &[Vector3<f64>]) {
+        let radii = self.hand.fingertips.iter().map(|tip| tip.radius_m);
+        let thickest = THINNER * radii.fold(f64::INFINITY, f64::min);
+        for end in bones {
+            let length = end.norm();
+            let radius = thickest.min(SLENDERNESS * length);
+            // The axis z of a cylinder, turned into the bone.
+            let across = blindgrasp_shared::math::norm(&Vector3::new(end.x, end.y, 0.0));
+            let rpy = [0.0, libm::atan2(across, end.z), libm::atan2(end.y, end.x)];
+            let middle: [f64; 3] = (end * 0.5).into();
+            let lines = [
+                "<visual>".into(),
+                format!("  <origin xyz=\"{}\" rpy=\"{}\"/>", numbers(&middle), numbers(&rpy)),
+                format!("  <geometry><cylinder radius=\"{radius:?}\" length=\"{length:?}\"/></geometry>"),
+                "  <material name=\"bone\"/>".into(),
+                "</visual>".into(),
+            ];
+            lines.into_iter().for_each(|line| self.line(2, line));
+        }
+    }
+}
+
+/// xx, yy, zz, xy, xz, yz; a file may leave out what is zero.
+fn moments(inertia: &InertiaFile) -> [f64; 6] {
+    std::array::from_fn(|k| inertia.0.get(k).copied().unwrap_or(0.0))
+}
+
+fn numbers(values: &[f64; 3]) -> String {
+    values.map(|value| format!("{value:?}")).join(" ")
+}
+
+/// A name as an attribute's value.
+fn escaped(name: &str) -> String {
+    name.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
+}
