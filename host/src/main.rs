@@ -18,6 +18,7 @@ struct Cli {
 enum Command {
     Sim(commands::sim::Arguments),
     Hand(commands::hand::Arguments),
+    Scene(commands::scene::Arguments),
     Pil(commands::pil::Arguments),
     Flash(commands::flash::Arguments),
     Console(commands::console::Arguments),
@@ -33,6 +34,7 @@ fn main() -> ExitCode {
     let outcome = match Cli::parse().command {
         Command::Sim(arguments) => commands::sim::run(&arguments),
         Command::Hand(arguments) => commands::hand::run(&arguments),
+        Command::Scene(arguments) => commands::scene::run(&arguments),
         Command::Pil(arguments) => commands::pil::run(&arguments),
         Command::Flash(arguments) => commands::flash::run(&arguments),
         Command::Console(arguments) => commands::console::run(&arguments),

@@ -69,7 +69,7 @@ pub fn is_trunk(hand: &Hand, joint: usize) -> bool {
 }
 
 /// The joints that move this fingertip and no other.
-fn own_joints(hand: &Hand, fingertip: usize) -> Vec<usize> {
+pub fn own_joints(hand: &Hand, fingertip: usize) -> Vec<usize> {
     let mut own: Vec<usize> = hand.joints_to(fingertip).filter(|&joint| !is_trunk(hand, joint)).collect();
     own.sort_unstable();
     own

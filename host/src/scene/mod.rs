@@ -46,6 +46,7 @@ pub use error::{Notice, Place, SceneError, suggestion};
 pub use file::{Actuators, Control, Friction, HandFile, ObjectFile, PlantSettings, SceneFile, Sensors};
 pub(crate) use hand::{moving_masses, posture};
 pub use hand_model::HandModel;
+pub use object::ObjectBody;
 pub(crate) use object::breaks_triangle;
 pub use source::config_source;
 
@@ -94,6 +95,29 @@ pub struct Scene {
     pub warnings: Vec<String>,
     /// The effective configuration.
     pub file: SceneFile,
+}
+
+/// What is known of a scene before hand and object meet, checked and prepared.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Parts {
+    /// Kinematics and link masses of the hand.
+    pub hand: Hand,
+    /// The object.
+    pub object: ObjectBody,
+    /// How many steps of the integrator make one control period.
+    pub substeps: usize,
+    /// What is odd but can be simulated, in words.
+    pub warnings: Vec<String>,
+}
+
+impl Parts {
+    /// Of a configuration whose pose and contacts are still to be found.
+    ///
+    /// # Errors
+    /// One line: which key, what is wrong, what to do.
+    pub fn of(file: &SceneFile) -> Result<Self, SceneError> {
+        build::parts(file)
+    }
 }
 
 /// What the simulator needs to know of a joint besides the [`Hand`]. Torque limit and friction are those that the

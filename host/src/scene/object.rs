@@ -9,10 +9,14 @@ use crate::plant::polyhedron::{Polyhedron, PolyhedronError};
 use nalgebra::{Matrix3, SymmetricEigen, Vector3};
 
 /// An object, checked.
-pub(super) struct Body {
-    pub(super) shape: Polyhedron,
-    pub(super) mass_kg: f64,
-    pub(super) inertia_kg_m2: Matrix3<f64>,
+#[derive(Clone, Debug, PartialEq)]
+pub struct ObjectBody {
+    /// Its shape in its own frame.
+    pub shape: Polyhedron,
+    /// Its mass, kg.
+    pub mass_kg: f64,
+    /// Its inertia about its centre of mass in its own frame, kg m^2.
+    pub inertia_kg_m2: Matrix3<f64>,
 }
 
 /// The polyhedron of a shape.
@@ -31,7 +35,7 @@ fn polyhedron(shape: &ShapeFile) -> std::result::Result<Polyhedron, PolyhedronEr
 }
 
 /// Checks an object and computes its mass and inertia.
-pub(super) fn object(file: &ObjectFile, warnings: &mut Vec<String>) -> Result<Body> {
+pub(super) fn object(file: &ObjectFile, warnings: &mut Vec<String>) -> Result<ObjectBody> {
     let shape = polyhedron(&file.shape).map_err(|error| {
         let key = match file.shape {
             ShapeFile::Box { .. } => "object.shape.box.size_m",
@@ -94,7 +98,7 @@ pub(super) fn object(file: &ObjectFile, warnings: &mut Vec<String>) -> Result<Bo
             inertia
         }
     };
-    Ok(Body { shape, mass_kg, inertia_kg_m2 })
+    Ok(ObjectBody { shape, mass_kg, inertia_kg_m2 })
 }
 
 /// A symmetric tensor from the three or six numbers of a file.
