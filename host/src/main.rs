@@ -18,6 +18,7 @@ struct Cli {
 enum Command {
     Sim(commands::sim::Arguments),
     Hand(commands::hand::Arguments),
+    Object(commands::object::Arguments),
     Scene(commands::scene::Arguments),
     Pil(commands::pil::Arguments),
     Flash(commands::flash::Arguments),
@@ -34,6 +35,7 @@ fn main() -> ExitCode {
     let outcome = match Cli::parse().command {
         Command::Sim(arguments) => commands::sim::run(&arguments),
         Command::Hand(arguments) => commands::hand::run(&arguments),
+        Command::Object(arguments) => commands::object::run(&arguments),
         Command::Scene(arguments) => commands::scene::run(&arguments),
         Command::Pil(arguments) => commands::pil::run(&arguments),
         Command::Flash(arguments) => commands::flash::run(&arguments),

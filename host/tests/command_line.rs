@@ -96,6 +96,16 @@ fn json_is_one_object_with_every_field() {
 }
 
 #[test]
+fn the_help_names_every_built_in_scene() {
+    let output = blindgrasp(&["sim", "--help"]);
+    assert_eq!(output.status.code(), Some(0));
+    let help = text(&output.stdout);
+    for name in blindgrasp::scene::Scene::built_in() {
+        assert!(help.contains(name), "no `{name}` in: {help}");
+    }
+}
+
+#[test]
 fn exit_code_says_whether_the_grasp_held() {
     let held = blindgrasp(&["sim", "cube"]);
     assert_eq!(held.status.code(), Some(0));
@@ -301,4 +311,66 @@ fn impossible_inertias_warn_or_are_refused() {
         &["sim", "cube-ideal", "--set", "object.inertia_kg_m2=[1e-6, 1e-6, -1e-6]"],
         &["object.inertia_kg_m2"],
     );
+}
+
+/// From a mesh to an object in a scene, as a new user does it.
+#[test]
+fn objects_are_checked_and_made_from_meshes() {
+    let folder = Folder::new("object");
+    // A tetrahedron in millimetres, whose last triangle shows its inside.
+    let corners = [[0, 0, 0], [40, 0, 0], [0, 40, 0], [0, 0, 40]];
+    let mut mesh = "solid\n".to_owned();
+    for triangle in [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 3, 2]] {
+        mesh += "facet normal 0 0 0\nouter loop\n";
+        for [x, y, z] in triangle.map(|k: usize| corners[k]) {
+            mesh += &format!("vertex {x} {y} {z}\n");
+        }
+        mesh += "endloop\nendfacet\n";
+    }
+    let mesh = folder.write("part.stl", &(mesh + "endsolid\n"));
+    assert_refused(
+        &["object", "check", &mesh],
+        &["part.stl: a mesh file does not say its unit", "--unit mm if it measures 40 x 40 x 40 mm"],
+    );
+    assert_refused(&["object", "check", &folder.path("no.stl"), "--unit", "mm"], &["no.stl: no such file"]);
+    let output = blindgrasp(&["object", "check", &mesh, "--unit", "mm"]);
+    let shown = text(&output.stdout);
+    assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
+    for words in [
+        "4 of 4 triangles",
+        "volume                10.67 cm^3",
+        "1 triangle that showed their inside turned over",
+        "good: 1 notice",
+    ] {
+        assert!(shown.contains(words), "no `{words}` in {shown}");
+    }
+
+    let output =
+        blindgrasp(&["object", "new", &mesh, "--unit", "mm", "--density-kg-m3", "20", "--name", "my part"]);
+    assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
+    let made = folder.path("part.toml");
+    let file = fs::read_to_string(&made).expect("the file");
+    assert!(
+        file.contains("name = \"my part\"")
+            && file.contains("file = \"part.stl\"")
+            && file.contains("unit = \"mm\""),
+        "{file}"
+    );
+    let output = blindgrasp(&["object", "new", &mesh, "--unit", "mm", "--mass-kg", "1"]);
+    assert_eq!(output.status.code(), Some(2));
+    assert!(text(&output.stderr).contains("part.toml: is there already; name another with --out"));
+    let output = blindgrasp(&["object", "check", &made, "--json"]);
+    let check: Value = serde_json::from_slice(&output.stdout).expect("JSON");
+    assert_eq!(check["verdict"], "good");
+    assert_eq!(check["faces"].as_array().map(Vec::len), Some(4));
+    let mass = check["body"]["mass_kg"].as_f64().expect("a mass");
+    assert!((mass / (20.0 * 64e-6 / 6.0) - 1.0).abs() < 1e-9, "{mass}");
+
+    // Broken: exit code 1, nothing written.
+    let open = fs::read_to_string(&mesh).expect("the mesh").replacen("vertex 40 0 0", "vertex 41 0 0", 1);
+    let open = folder.write("open.stl", &open);
+    let output = blindgrasp(&["object", "new", &open, "--unit", "mm", "--mass-kg", "1"]);
+    assert_eq!(output.status.code(), Some(1));
+    assert!(text(&output.stderr).contains("it is not closed"), "{}", text(&output.stderr));
+    assert!(!Path::new(&folder.path("open.toml")).exists());
 }

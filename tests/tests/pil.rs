@@ -30,6 +30,10 @@ use std::fs;
 use std::time::{Duration, Instant};
 
 const TWO_FINGERS: &str = "models/hands/two-finger.toml";
+/// As many joints as the board has counters for.
+const SIXTEEN_JOINTS: &str = "models/hands/allegro-like.toml";
+/// More than that.
+const EIGHTEEN_JOINTS: &str = "models/hands/hand-arm.toml";
 
 fn qemu(hand: &str) -> Qemu {
     let image = kept_image("pil", hand);
@@ -143,6 +147,27 @@ fn the_prism_is_grasped_as_in_the_simulation() {
 #[test]
 fn another_hand_has_another_image_and_grasps() {
     grasps("two-finger-prism", TWO_FINGERS, 3_000);
+}
+
+#[test]
+fn a_hand_as_large_as_the_board_allows_grasps() {
+    grasps("allegro-like-prism", SIXTEEN_JOINTS, 3_000);
+}
+
+#[test]
+fn a_larger_hand_is_refused_before_anything_is_compiled() {
+    let output = std::process::Command::new("tests/firmware-toolchain")
+        .args(["cargo", "build", "--quiet", "--locked", "-p", "blindgrasp-firmware", "--bin", "pil"])
+        .args(["--profile", "firmware", "--target", "thumbv7em-none-eabihf"])
+        .env("HAND", EIGHTEEN_JOINTS)
+        .current_dir(root())
+        .output()
+        .expect("tests/firmware-toolchain runs");
+    let errors = String::from_utf8_lossy(&output.stderr);
+    assert!(!output.status.success(), "{errors}");
+    let told = "HAND=models/hands/hand-arm.toml: the hand has 18 joints, and the board has counters and outputs for 16: \
+                without firmware, `blindgrasp sim` and `blindgrasp serve` run it";
+    assert!(errors.contains(told) && !errors.contains("E0080"), "{errors}");
 }
 
 /// Through the firmware's driver of the serial port.

@@ -5,6 +5,7 @@ pub(crate) mod export;
 pub(crate) mod flash;
 pub(crate) mod hand;
 pub(crate) mod monitor;
+pub(crate) mod object;
 mod output;
 pub(crate) mod pil;
 mod ports;

@@ -196,6 +196,14 @@ impl Findings {
         self.0.sort_by_key(|finding| (finding.severity, line(finding)));
     }
 
+    /// Tells the keys that findings are of, and where these stand in the file.
+    pub(crate) fn locate(&mut self, place_of: impl Fn(&str) -> Place) {
+        for finding in self.0.iter_mut().filter(|finding| !finding.key.is_empty()) {
+            finding.subject = finding.key.clone();
+            finding.place = Some(place_of(&finding.key));
+        }
+    }
+
     /// A line for each, as people want to read them: of findings that differ in names and numbers only, the first and how
     /// many others there are, if they come from one place (a default) or are more than three.
     pub fn lines(&self) -> Vec<String> {

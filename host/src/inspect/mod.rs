@@ -9,3 +9,4 @@
 
 pub mod finding;
 pub mod hand;
+pub mod object;

@@ -25,6 +25,7 @@
 use super::facet::Facet;
 use super::position::ROOM_RAD;
 use super::rolling::{Coordinates, Gains, Rolling};
+use super::stance::room;
 use crate::scene::inverse_kinematics::own_joints;
 use crate::scene::{Scene, posture};
 use blindgrasp_shared::math::{Real, norm};
@@ -143,7 +144,7 @@ impl Quality {
                 }
             })
             .collect();
-        let (room_rad, joint) = room(scene);
+        let (room_rad, joint) = room(&scene.hand, &scene.start.angles_rad);
         let chance = chance(least_margin, rolling.mean_square_turn(&z));
         Some(Self {
             score: score(chance, room_rad),
@@ -166,15 +167,4 @@ fn conditioning(scene: &Scene, fingertip: usize) -> f64 {
     }
     let squares = square.symmetric_eigenvalues();
     (squares.min().max(0.0) / squares.max().max(f64::MIN_POSITIVE)).square_root()
-}
-
-/// The least distance of a joint from an end stop, rad, and which; of joints that move one fingertip.
-fn room(scene: &Scene) -> (f64, usize) {
-    let own = (0..scene.contacts.len()).flat_map(|i| own_joints(&scene.hand, i));
-    own.map(|k| {
-        let ((lower, upper), angle) = (scene.hand.range_rad(k), scene.start.angles_rad[k]);
-        (f64::min(angle - lower, upper - angle), k)
-    })
-    .min_by(|a, b| a.0.total_cmp(&b.0))
-    .unwrap_or((f64::INFINITY, 0))
 }

@@ -78,6 +78,8 @@ pub(super) struct Count {
     pub(super) apart: usize,
     /// Positions that were tried at which a fingertip does not get to its contact: by how much (m).
     pub(super) unreachable: Tally<Miss>,
+    /// At which a joint would stand at its end stop.
+    pub(super) at_stop: Tally<Miss>,
     /// At which fingertips overlap (m), or meet another part of the object (m).
     pub(super) overlap: Tally<Miss>,
     /// At which a fingertip would touch with its back.
@@ -91,6 +93,7 @@ impl Count {
     pub(super) fn miss(&mut self, miss: Miss) {
         match miss {
             Miss::Unreachable(by) => self.unreachable.add(by.distance_m, miss),
+            Miss::AtStop(_) => self.at_stop.add(0.0, miss),
             Miss::Overlap(_, _, by) | Miss::Beside(_, by) => self.overlap.add(by, miss),
             Miss::Back(_, cosine) => self.back.add(-cosine, miss),
             Miss::Through(_) | Miss::TipThrough(_) => self.through.add(0.0, miss),
@@ -124,6 +127,7 @@ impl Count {
         test(self.apart, "no position at which every fingertip gets to its contact", String::new());
         let misses = [
             (&self.unreachable, "tried, but a fingertip does not quite get there"),
+            (&self.at_stop, "tried, but a joint would stand at its end stop"),
             (&self.overlap, "tried, but a fingertip would be in the way"),
             (&self.back, "tried, but a fingertip would touch with its back"),
             (&self.through, "tried, but a finger would pass through the object"),
@@ -137,16 +141,17 @@ impl Count {
     /// What it comes down to: the last test that anything came to.
     fn reason(&self, words: &Words<'_>) -> String {
         let fingertips = words.hand.fingertips.len();
-        let tried = [&self.unreachable, &self.overlap, &self.back, &self.through];
+        let tried = [&self.unreachable, &self.at_stop, &self.overlap, &self.back, &self.through];
         if tried.iter().any(|tally| tally.failed > 0) {
             let worst = tried.into_iter().max_by_key(|tally| tally.failed);
             let miss = worst.map_or(String::new(), |tally| nearest(tally, |_, miss| words.miss(miss)));
             return format!("the fingers come near, but {miss}");
         }
         if self.apart > 0 {
+            let at = if words.any_position { "there is no position" } else { "the given position is none" };
+            let attitude = if words.any_attitude { "any of the attitudes tried" } else { "this attitude" };
             return format!(
-                "there is no position{} at which all {fingertips} fingertips get to contacts of theirs at once",
-                if words.any_attitude { ", in any of the attitudes tried," } else { ", in this attitude," }
+                "{at} at which, in {attitude}, all {fingertips} fingertips get to contacts of theirs at once"
             );
         }
         if let Some((_, (i, j, across))) = &self.wide.nearest {
@@ -209,6 +214,7 @@ impl Words<'_> {
                     by.distance_m * 1e3
                 )
             }
+            Miss::AtStop(k) => format!("joint `{}` would stand at its end stop", self.hand.joints[k].name),
             Miss::Overlap(i, j, by) => {
                 format!(
                     "fingertips `{}` and `{}` would overlap by {:.1} mm",

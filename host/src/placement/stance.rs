@@ -7,6 +7,9 @@ use crate::scene::posture;
 use crate::{Hand, Posture};
 use nalgebra::{UnitQuaternion, Vector3};
 
+/// Room that a fingertip needs from parts of the object beside its face, m: more than a scene asks for.
+const CLEAR_M: f64 = 1e-6;
+
 /// Where everything is to be.
 #[derive(Clone, Debug)]
 pub(super) struct Stance {
@@ -27,6 +30,8 @@ pub(super) struct Stance {
 pub(super) enum Miss {
     /// A fingertip does not get there.
     Unreachable(Unreachable),
+    /// A joint would stand at its end stop.
+    AtStop(usize),
     /// Two fingertips overlap, by so many metres.
     Overlap(usize, usize, f64),
     /// A fingertip would touch with its back: the angle between its bone and the inward normal, as a cosine.
@@ -53,8 +58,9 @@ pub(super) fn take(
                 return Err(Miss::Overlap(j, i, overlap));
             }
         }
-        let missing = hand.radius_m(i) - room_beside_m(shape, stance.faces[i], centre);
-        if missing > 0.0 {
+        // Of parts of the body that rise above the face; a convex body has none.
+        let missing = hand.radius_m(i) - shape.clearance_m(stance.faces[i], centre);
+        if missing > -CLEAR_M {
             return Err(Miss::Beside(i, missing));
         }
     }
@@ -72,19 +78,19 @@ pub(super) fn take(
         }
     }
     through(hand, &posture, shape, stance)?;
-    let own = (0..targets.len()).flat_map(|i| own_joints(hand, i));
-    Ok(own
-        .map(|k| {
-            let (lower, upper) = hand.range_rad(k);
-            f64::min(angles[k] - lower, upper - angles[k])
-        })
-        .fold(f64::INFINITY, f64::min))
+    let (room_rad, joint) = room(hand, &angles);
+    if room_rad > 0.0 { Ok(room_rad) } else { Err(Miss::AtStop(joint)) }
 }
 
-/// How far a fingertip's centre over its face is from the parts of the body that rise above that face, m. A convex body has
-/// none.
-fn room_beside_m(_shape: &Polyhedron, _face: usize, _centre_m: &Vector3<f64>) -> f64 {
-    f64::INFINITY
+/// The least distance of a joint from an end stop, rad, and which it is; of joints that move one fingertip.
+pub(super) fn room(hand: &Hand, angles_rad: &[f64]) -> (f64, usize) {
+    let own = (0..hand.fingertip_count()).flat_map(|i| own_joints(hand, i));
+    own.map(|k| {
+        let ((lower, upper), angle) = (hand.range_rad(k), angles_rad[k]);
+        (f64::min(angle - lower, upper - angle), k)
+    })
+    .min_by(|a, b| a.0.total_cmp(&b.0))
+    .unwrap_or((f64::INFINITY, 0))
 }
 
 /// Whether a bone passes through the object: the lines between the joints, from the base on.

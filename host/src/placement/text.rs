@@ -128,9 +128,12 @@ fn settings(text: &mut String, file: &SceneFile) {
         file.actuators.output_delay_ticks,
         file.actuators.torque_limits,
     );
+    if let Some(slew) = file.actuators.slew_limit_nm_s {
+        let _ = writeln!(text, "slew_limit_nm_s = {slew:?}");
+    }
     let _ = write!(
         text,
-        "\n[friction]\nscale = {:?}\n\n[plant]\nsubstep_s = {:?}\ngravity_m_s2 = {:?}\ngravity_on_object = {}     # assumption 5\n",
+        "\n[friction]\nscale = {:?}\n\n[plant]\nsubstep_s = {:?}\ngravity_m_s2 = {:?}\ngravity_on_object = {}\n",
         file.friction.scale, plant.substep_s, plant.gravity_m_s2, plant.gravity_on_object,
     );
 }

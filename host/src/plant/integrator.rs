@@ -23,6 +23,7 @@ use super::contact::{Contact, Rows};
 use super::coupling::{Branches, Coupling, Everything, MAX_CHAIN, ObjectMass};
 use super::dynamics::{Body, JointMatrix, JointVector, bias_torques, mass_matrix, place_bodies};
 use super::model::{ContactForce, Lost, ModelError, Motion, PlantModel};
+use super::surroundings::Surroundings;
 use crate::{MAX_FINGERS, MAX_JOINTS, Posture};
 use blindgrasp_shared::math::Real;
 use nalgebra::{Matrix3, Quaternion, UnitQuaternion, Vector3};
@@ -49,6 +50,8 @@ pub struct Plant {
     bodies: [Body; MAX_JOINTS],
     mass: JointMatrix,
     contacts: Vec<Contact>,
+    /// What each fingertip may run into.
+    surroundings: Vec<Surroundings>,
     forces: Vec<ContactForce>,
     coupling: Coupling,
     solution: Everything,
@@ -74,6 +77,11 @@ impl Plant {
             bodies: [Body::NONE; MAX_JOINTS],
             mass: [[0.0; MAX_JOINTS]; MAX_JOINTS],
             contacts: Vec::with_capacity(fingers),
+            surroundings: model
+                .faces
+                .iter()
+                .map(|face| Surroundings::of(&model.object.shape, face))
+                .collect(),
             forces: vec![ContactForce::default(); fingers],
             substep_s,
             motion,
@@ -251,7 +259,7 @@ impl Plant {
     }
 
     /// Whether the assumptions that the model stands on still hold.
-    fn watch(&self) -> Result<(), Lost> {
+    fn watch(&mut self) -> Result<(), Lost> {
         let shape = &self.model.object.shape;
         for (finger, (contact, face)) in self.contacts.iter().zip(&self.model.faces).enumerate() {
             if !contact.indentation_m.is_finite() {
@@ -264,6 +272,10 @@ impl Plant {
             let foot = face.frame * Vector3::new(x, -face.distance_m, z);
             if shape.margin_m(face.face, &foot) < 0.0 {
                 return Err(Lost::OffFace { finger });
+            }
+            let centre = foot - face.frame.column(1) * contact.rolling_radius_m;
+            if self.surroundings[finger].reach(&centre, self.model.fingertips[finger].radius_m) {
+                return Err(Lost::Blocked { finger });
             }
         }
         Ok(())

@@ -11,6 +11,7 @@ pub mod integrator;
 mod linear;
 pub mod model;
 pub mod polyhedron;
+mod surroundings;
 
 pub use coupling::MAX_CHAIN;
 pub use integrator::Plant;

@@ -84,6 +84,12 @@ pub enum Lost {
         /// The finger, from 0.
         finger: usize,
     },
+    /// A fingertip came to another part of the object than its face, which the model knows nothing of (assumption 3).
+    #[error("finger {} ran into another part of the object than its face", .finger + 1)]
+    Blocked {
+        /// The finger, from 0.
+        finger: usize,
+    },
     /// The rolling constraints are no longer independent (Eq. 28 has no solution).
     #[error("the rolling constraints became dependent")]
     Rank,

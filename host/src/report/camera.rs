@@ -18,7 +18,7 @@ pub(super) struct View {
 
 impl View {
     /// Looks from `azimuth` (about z, from x) and from `elevation` above.
-    fn towards(azimuth_deg: f64, elevation_deg: f64) -> Self {
+    pub(super) fn towards(azimuth_deg: f64, elevation_deg: f64) -> Self {
         let (sine, cosine) = azimuth_deg.to_radians().sine_cosine();
         let (rise, level) = elevation_deg.to_radians().sine_cosine();
         let back = Vector3::new(cosine * level, sine * level, rise);
@@ -55,6 +55,13 @@ impl View {
             });
         // A little to the side, so that no face is seen square on.
         Self::towards(best.0 + 12.0, elevation_deg)
+    }
+
+    /// The same elevation from elsewhere: turned about z.
+    pub(super) fn turned(&self, degrees: f64) -> Self {
+        let (sine, cosine) = degrees.to_radians().sine_cosine();
+        let turn = |v: Vector3<f64>| Vector3::new(v.x * cosine - v.y * sine, v.x * sine + v.y * cosine, v.z);
+        Self { right: turn(self.right), up: turn(self.up), back: turn(self.back) }
     }
 
     /// Where a point is in the picture plane, to the right and up, m.

@@ -68,20 +68,16 @@ pub(super) fn prism() -> Polyhedron {
     // Corner k lies between the faces of fingers k and k + 1.
     let corner = |k: usize, z: f64| -around((k + 2) % FINGERS).0 * 2.0 * inner + Vector3::z() * z;
     let height = 0.022;
-    let vertices_m =
+    let vertices_m: Vec<_> =
         (0..2 * FINGERS).map(|k| corner(k % FINGERS, if k < FINGERS { -height } else { height })).collect();
-    let mut faces: Vec<Face> = (0..FINGERS)
-        .map(|k| {
-            let before = (k + FINGERS - 1) % FINGERS;
-            Face {
-                normal: around(k).0,
-                distance_m: inner,
-                corners: vec![before, k, k + FINGERS, before + FINGERS],
-            }
-        })
+    let sides = (0..FINGERS).map(|k| {
+        let before = (k + FINGERS - 1) % FINGERS;
+        vec![before, k, k + FINGERS, before + FINGERS]
+    });
+    let faces = sides
+        .chain([vec![2, 1, 0], vec![3, 4, 5]])
+        .map(|corners| Face::convex(&vertices_m, corners))
         .collect();
-    faces.push(Face { normal: -Vector3::z(), distance_m: height, corners: vec![2, 1, 0] });
-    faces.push(Face { normal: Vector3::z(), distance_m: height, corners: vec![3, 4, 5] });
     Polyhedron { vertices_m, faces }
 }
 

@@ -18,7 +18,7 @@ pub(super) struct Triangle {
 #[derive(Clone, Debug, Default)]
 pub(super) struct Mesh {
     pub(super) solid: Vec<Triangle>,
-    /// Faces of one convex body that one can look through.
+    /// Faces of one body that one can look through.
     pub(super) glass: Vec<Triangle>,
     /// What shows in front of everything.
     pub(super) marks: Vec<Triangle>,
@@ -74,13 +74,9 @@ impl Mesh {
         }
     }
 
-    /// A flat convex face of glass.
-    pub(super) fn pane(&mut self, corners: &[Vector3<f64>], normal: Vector3<f64>, colour: Rgb) {
-        let Some((first, rest)) = corners.split_first() else { return };
-        for pair in rest.windows(2) {
-            let corners = [*first, pair[0], pair[1]];
-            self.glass.push(Triangle { corners, normals: [normal; 3], colour });
-        }
+    /// A piece of a flat face of glass.
+    pub(super) fn pane(&mut self, corners: [Vector3<f64>; 3], normal: Vector3<f64>, colour: Rgb) {
+        self.glass.push(Triangle { corners, normals: [normal; 3], colour });
     }
 
     /// All corners.

@@ -13,7 +13,7 @@
 //!
 //! `plots` says what the plots show, `chart` draws them with Plotters; `scene3d` turns hand and object into triangles,
 //! `camera` chooses where to look from, `raster` draws them, `picture` and `animation` add the words. `canvas` and
-//! `text` are the bitmap under all of it.
+//! `text` are the bitmap under all of it. `sketch` draws a hand or an object alone, as SVG: [`hand_svg`], [`object_svg`].
 
 mod animation;
 mod backend;
@@ -36,11 +36,13 @@ mod raster;
 mod scene3d;
 mod series;
 mod skeleton;
+mod sketch;
 #[cfg(test)]
 mod tests;
 mod text;
 
 pub use input::Report;
+pub use sketch::{hand_svg, object_svg};
 
 use std::path::{Path, PathBuf};
 use std::{fs, io};

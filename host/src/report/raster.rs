@@ -27,7 +27,8 @@ pub(super) fn render(
     };
     raster.draw_solid(&mesh.solid, &camera);
     raster.outline(outline_m as f32, samples);
-    // A convex body's rear faces don't hide one another, nor do its front faces: no sorting is needed.
+    // A convex body's rear faces don't hide one another, nor do its front faces: no sorting is needed. Where a body is not
+    // convex, two front faces may mix their shades in the wrong order, which glass hardly shows.
     let (front, rear): (Vec<_>, Vec<_>) =
         mesh.glass.iter().partition(|pane| pane.normals[0].dot(&camera.view.back) > 0.0);
     for (panes, cover) in [(rear, REAR_COVER), (front, FRONT_COVER)] {

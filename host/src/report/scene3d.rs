@@ -10,12 +10,17 @@ use crate::plant::polyhedron::Polyhedron;
 use crate::record::sample::{ContactSample, Sample};
 use crate::{Hand, MAX_JOINTS, Posture};
 use nalgebra::Vector3;
-use std::collections::BTreeSet;
+use std::collections::BTreeMap;
 
 const GLASS: Rgb = [132, 178, 212];
 /// Arrows.
 pub(super) const FORCE: Rgb = [250, 226, 60];
 const EDGE: Rgb = [52, 66, 84];
+
+/// More edges than this are not drawn.
+const MANY_EDGES: usize = 500;
+/// The faces of a sharp edge have normals whose product is below this: 30 degrees.
+const SHARP: f64 = 0.866;
 
 /// What is the same for all moments of a run: sizes, the scale of the forces, and where to look from.
 #[derive(Clone, Debug)]
@@ -87,21 +92,17 @@ impl Stage {
 
     fn add_object(&self, mesh: &mut Mesh, object: &Polyhedron, sample: &Sample) {
         let place = |corner: &Vector3<f64>| sample.position_m + sample.attitude * corner;
-        let mut edges = BTreeSet::new();
         for face in &object.faces {
-            let corners: Vec<Vector3<f64>> =
-                face.corners.iter().filter_map(|&k| object.vertices_m.get(k)).map(place).collect();
-            mesh.pane(&corners, sample.attitude * face.normal, GLASS);
-            let next = face.corners.iter().cycle().skip(1);
-            edges.extend(face.corners.iter().zip(next).map(|(&a, &b)| (a.min(b), a.max(b))));
-        }
-        for (a, b) in edges {
-            if let (Some(a), Some(b)) = (object.vertices_m.get(a), object.vertices_m.get(b)) {
-                let radius = 0.011 * self.object_radius_m;
-                mesh.cone([place(a), place(b)], [radius; 2], THIN, EDGE);
-                mesh.sphere(place(a), radius, THIN, EDGE);
-                mesh.sphere(place(b), radius, THIN, EDGE);
+            let normal = sample.attitude * face.normal;
+            for corners in &face.triangles {
+                mesh.pane(corners.map(|k| place(&object.vertices_m[k])), normal, GLASS);
             }
+        }
+        for [a, b] in edges(object) {
+            let radius = 0.011 * self.object_radius_m;
+            mesh.cone([place(&a), place(&b)], [radius; 2], THIN, EDGE);
+            mesh.sphere(place(&a), radius, THIN, EDGE);
+            mesh.sphere(place(&b), radius, THIN, EDGE);
         }
     }
 
@@ -121,6 +122,27 @@ impl Stage {
         arrow.cone([tip - along * head, tip], [2.4 * radius, 0.0], ROUND, FORCE);
         mesh.marks.append(&mut arrow.solid);
     }
+}
+
+/// The edges of a body that are drawn: all of them; where there are many, those that one would feel.
+fn edges(object: &Polyhedron) -> Vec<[Vector3<f64>; 2]> {
+    let mut sides: BTreeMap<(usize, usize), Vec<Vector3<f64>>> = BTreeMap::new();
+    for face in &object.faces {
+        for (a, b) in face.edges() {
+            sides.entry((a.min(b), a.max(b))).or_default().push(face.normal);
+        }
+    }
+    let many = sides.len() > MANY_EDGES;
+    let is_sharp = |normals: &[Vector3<f64>]| match normals {
+        [a, b] => a.dot(b) < SHARP,
+        _ => true,
+    };
+    sides
+        .into_iter()
+        .filter(|(_, normals)| !many || is_sharp(normals))
+        .take(MANY_EDGES)
+        .map(|((a, b), _)| [a, b].map(|k| object.vertices_m[k]))
+        .collect()
 }
 
 /// `f C_Y - lambda_X C_X - lambda_Z C_Z`, N.

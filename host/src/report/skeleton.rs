@@ -6,9 +6,9 @@ use super::palm::Palm;
 use crate::{Hand, Posture};
 use nalgebra::Vector3;
 
-const LINK: Rgb = [208, 212, 218];
-const JOINT: Rgb = [112, 119, 130];
-const PALM: Rgb = [176, 182, 190];
+pub(super) const LINK: Rgb = [208, 212, 218];
+pub(super) const JOINT: Rgb = [112, 119, 130];
+pub(super) const PALM: Rgb = [176, 182, 190];
 
 /// Thickness of what has none in the model, m.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -72,7 +72,7 @@ pub(super) fn add(mesh: &mut Mesh, hand: &Hand, posture: &Posture, sizes: &Sizes
 }
 
 /// The only finger that a joint moves; `None` for a joint of the trunk.
-fn owner(hand: &Hand, joint: usize) -> Option<usize> {
+pub(super) fn owner(hand: &Hand, joint: usize) -> Option<usize> {
     let mut moved = (0..hand.fingertip_count()).filter(|&i| hand.moves(joint, i));
     moved.next().filter(|_| moved.next().is_none())
 }

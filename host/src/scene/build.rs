@@ -2,8 +2,8 @@
 
 use super::{
     Parts, Scene,
-    check::{Result, all_within, fail, name, within},
-    file::{Control, SCHEMA, SceneFile},
+    check::{Result, all_within, fail, name, schema, within},
+    file::{Control, SceneFile},
     hand::{fingertip_parameters, hand, joint_parameters, moving_masses, overlaps},
     object::object,
     start::start,
@@ -73,17 +73,9 @@ pub(super) fn scene(file: SceneFile) -> Result<Scene> {
 
 /// Everything that is a plain number. Returns the number of sub-steps in a control period.
 fn settings(file: &SceneFile) -> Result<usize> {
-    for (key, schema) in
-        [("schema", file.schema), ("hand.schema", file.hand.schema), ("object.schema", file.object.schema)]
-    {
-        if schema != SCHEMA {
-            return fail(
-                key,
-                format!("{schema} is a format that this program does not know"),
-                format!("write it as format {SCHEMA}"),
-            );
-        }
-    }
+    schema("schema", file.schema)?;
+    schema("hand.schema", file.hand.schema)?;
+    schema("object.schema", file.object.schema)?;
     // Those of the scene are what acts; those of the hand say which firmware is its own.
     if let Some(gains) = &file.hand.control {
         control(gains).map_err(|mut error| {

@@ -1,12 +1,13 @@
 //! Checks of single values, and the errors that they make.
 
 use super::error::SceneError;
+use super::file::SCHEMA;
 
 /// What a check gives.
 pub(super) type Result<T> = std::result::Result<T, SceneError>;
 
 /// Bytes of a name.
-const LONGEST_NAME: usize = 100;
+pub(super) const LONGEST_NAME: usize = 100;
 
 pub(super) fn fail<T>(
     key: impl Into<String>,
@@ -49,6 +50,15 @@ pub(super) fn distinct<'a>(list: &str, names: impl Iterator<Item = &'a str>) -> 
         seen.push(word);
     }
     Ok(())
+}
+
+/// The version of a file's format.
+pub(super) fn schema(key: &str, version: u32) -> Result<()> {
+    if version == SCHEMA {
+        return Ok(());
+    }
+    let remedy = format!("write it as format {SCHEMA}");
+    fail(key, format!("{version} is a format that this program does not know"), remedy)
 }
 
 /// A name that can be shown in one line.

@@ -57,7 +57,7 @@ impl SceneError {
         Self { place: None, key: key.into(), problem: problem.into(), remedy: remedy.into() }
     }
 
-    pub(super) fn at(mut self, place: &Place) -> Self {
+    pub(crate) fn at(mut self, place: &Place) -> Self {
         self.place.get_or_insert_with(|| place.clone());
         self
     }

@@ -3,6 +3,10 @@
 //! These structs are the effective configuration: what stays after references are followed, defaults filled in and
 //! `--set` applied. Tests build them in code and hand them to [`Scene::build`](super::Scene::build).
 
+mod object;
+
+pub use object::{ObjectFile, ShapeFile};
+
 use serde::{Deserialize, Deserializer, Serialize, Serializer, de};
 use std::collections::BTreeMap;
 
@@ -381,64 +385,6 @@ pub struct FingertipFile {
     pub damping_n_s_m_per_m2: f64,
     /// Torsional damping `b_i` of Eq. 15 for each square metre of contact area, (N m s/rad)/m^2.
     pub torsional_damping_nm_s_rad_per_m2: f64,
-}
-
-/// An object.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct ObjectFile {
-    /// Version of the format; [`SCHEMA`].
-    pub schema: u32,
-    /// A word.
-    pub name: String,
-    /// A sentence or two.
-    #[serde(default)]
-    pub description: String,
-    /// Mass, kg.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub mass_kg: Option<f64>,
-    /// Instead of the mass: density, kg/m^3.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub density_kg_m3: Option<f64>,
-    /// Inertia about the centre of mass in the object frame, kg m^2; without it, that of a uniform body.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub inertia_kg_m2: Option<InertiaFile>,
-    /// What it looks like.
-    pub shape: ShapeFile,
-}
-
-/// A convex polyhedron. Wherever its description puts the origin, the object frame has its origin at the centre of mass.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case", deny_unknown_fields)]
-pub enum ShapeFile {
-    /// A box with its sides along the axes. Faces: -x, +x, -y, +y, -z, +z.
-    Box {
-        /// Side lengths along x, y and z, m.
-        size_m: [f64; 3],
-    },
-    /// A right prism over a regular polygon, its axis along z. Faces: the sides, beginning with the one that looks
-    /// along -y and going counter-clockwise seen from +z; then bottom (-z) and top (+z).
-    Prism {
-        /// Number of sides.
-        sides: u32,
-        /// Length of a side, m.
-        side_m: f64,
-        /// Extent along z, m.
-        height_m: f64,
-    },
-    /// A right prism over a convex polygon, its axis along z. Faces: the sides from each corner to the next; then
-    /// bottom and top.
-    PolygonPrism {
-        /// Corners x, y, m, counter-clockwise seen from +z.
-        corners_m: Vec<[f64; 2]>,
-        /// Extent along z, m.
-        height_m: f64,
-    },
-    /// The convex hull of points.
-    Hull {
-        /// The points, m.
-        points_m: Vec<[f64; 3]>,
-    },
 }
 
 fn one() -> f64 {

@@ -156,7 +156,10 @@ fn hand_error(file: &HandFile, error: HandError) -> SceneError {
         HandError::NoJoints => SceneError::new("hand.joint", "the hand has no joint", "add a [[joint]]"),
         HandError::TooFewFingertips { count } => SceneError::new(
             "hand.fingertip",
-            format!("the hand has {count} fingertips: grasping needs at least two"),
+            format!(
+                "the hand has {count} fingertip{}: grasping needs at least two",
+                if count == 1 { "" } else { "s" }
+            ),
             "add a [[fingertip]]",
         ),
         HandError::TooManyJoints { .. } => SceneError::new("hand.joint", error.to_string(), "leave some out"),

@@ -3,10 +3,10 @@
 use super::Scene;
 use super::{
     build::control,
-    check::{Result, fail, name},
+    check::{Result, fail, name, schema},
     controller::Setup,
     error::{Notice, Place, SceneError},
-    file::{Actuators, HandFile, PlantSettings, SCHEMA, Sensors},
+    file::{Actuators, HandFile, PlantSettings, Sensors},
     hand::{hand, kinematics},
     library::{Document, Kind, is_path},
     source::{IMPORTS, Source, config_source},
@@ -75,7 +75,8 @@ impl HandModel {
         std::iter::once(name_or_path.into()).chain(urdf).collect()
     }
 
-    fn from_document(document: Document) -> std::result::Result<(Self, HandFile), SceneError> {
+    /// Of a hand's file, with all that it says.
+    pub(super) fn from_document(document: Document) -> std::result::Result<(Self, HandFile), SceneError> {
         let (file, mut model, notices) = checked(document, Self::build)?;
         model.warnings.splice(0..0, notices.iter().map(Notice::to_string));
         Ok((model, file))
@@ -171,13 +172,7 @@ impl HandFile {
 
     /// Checks all that every hand needs, and prepares it. A firmware needs the table `[control]` as well.
     pub(crate) fn prepare(&self, warnings: &mut Vec<String>) -> Result<Hand> {
-        if self.schema != SCHEMA {
-            return fail(
-                "schema",
-                format!("{} is a format that this program does not know", self.schema),
-                format!("write it as format {SCHEMA}"),
-            );
-        }
+        schema("schema", self.schema)?;
         name("name", &self.name)?;
         self.control.as_ref().map_or(Ok(()), control)?;
         hand(self, warnings).map_err(as_of_hand)

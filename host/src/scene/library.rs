@@ -2,6 +2,7 @@
 
 use super::{
     error::{Notice, Place, SceneError, suggestion},
+    mesh,
     tree::{Node, Setting, Value},
     urdf,
 };
@@ -10,6 +11,10 @@ use std::path::{Path, PathBuf};
 
 /// No file of ours comes close; something else was named by mistake.
 const LARGEST_FILE: u64 = 4 << 20;
+/// No scene or object comes close, but for one with a mesh written into it.
+const LARGEST_TOML: u64 = 32 << 20;
+/// Values of a file, roughly: the largest mesh has 1.2 million. Each takes some hundred bytes while the file is read.
+const MOST_VALUES: usize = 2_000_000;
 
 /// What a file describes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -34,6 +39,27 @@ impl Kind {
         }
     }
 
+    /// Refuses a file of another kind, by what every file of a kind has: otherwise the first of its keys would be unknown.
+    fn refuse_others(self, node: &Node) -> Result<(), SceneError> {
+        let has = |kind| match kind {
+            Self::Scene => node.get("pose").is_some(),
+            Self::Hand => node.get("fingertip").is_some(),
+            Self::Object => node.get("shape").is_some(),
+        };
+        let other = [Self::Scene, Self::Hand, Self::Object].into_iter().find(|&kind| has(kind));
+        match other {
+            Some(other) if !has(self) => {
+                let article = |kind: Self| if kind == Self::Object { "an" } else { "a" };
+                let other = format!("{} {}", article(other), other.word());
+                let own = format!("{} {}", article(self), self.word());
+                let problem = format!("describes {other}, not {own}");
+                Err(SceneError::new("", problem, format!("name the file of {own}"))
+                    .at(&Place::whole(&node.place.source)))
+            }
+            _ => Ok(()),
+        }
+    }
+
     /// Names and texts.
     pub(super) fn built_in(self) -> &'static [(&'static str, &'static str)] {
         match self {
@@ -41,13 +67,17 @@ impl Kind {
                 built_in!("scenes":
                     "prism" "cube" "prism-ideal" "cube-ideal" "cube-normal-only"
                     "hand-arm" "hand-arm-consistent" "hand-arm-firm"
-                    "two-finger-prism" "four-finger-cube" "allegro-like-prism"
+                    "l-bracket" "two-finger-prism" "four-finger-cube" "allegro-like-prism"
                 )
             }
             Self::Hand => {
                 built_in!("hands": "three-finger" "hand-arm" "two-finger" "four-finger" "allegro-like")
             }
-            Self::Object => built_in!("objects": "prism" "cube" "hexagonal-prism" "cuboid" "cuboid-printed"),
+            Self::Object => {
+                built_in!("objects":
+                    "prism" "cube" "hexagonal-prism" "cuboid" "cuboid-printed" "l-bracket" "octahedron"
+                )
+            }
         }
     }
 }
@@ -56,6 +86,12 @@ impl Kind {
 const BUILT_IN_URDFS: &[(&str, &str)] = &[
     #[cfg(test)]
     ("gripper.urdf", include_str!("urdf/tests/gripper.urdf")),
+];
+
+/// Mesh files that objects built in name, by their names.
+const BUILT_IN_MESHES: &[(&str, &[u8])] = &[
+    ("l-bracket.stl", include_bytes!("../../../models/objects/l-bracket.stl")),
+    ("octahedron.obj", include_bytes!("../../../models/objects/octahedron.obj")),
 ];
 
 /// What the references of a file are relative to.
@@ -91,6 +127,22 @@ impl Home {
         Ok((read_text(&path, ".urdf")?.into(), path.to_string_lossy().into_owned()))
     }
 
+    /// The bytes of the mesh file that an object names.
+    pub(super) fn mesh(
+        &self,
+        file: &str,
+        named_at: &Place,
+        largest: u64,
+    ) -> Result<Cow<'static, [u8]>, SceneError> {
+        if let (Self::BuiltIn, true) = (self, named_at.is_in_a_file()) {
+            return match BUILT_IN_MESHES.iter().find(|(name, _)| *name == file) {
+                Some((_, bytes)) => Ok(Cow::Borrowed(bytes)),
+                None => Err(SceneError::new("", "is not built in", "name it by its path")),
+            };
+        }
+        read_bytes(&self.resolve(file, named_at), ".stl or .obj", largest).map(Cow::Owned)
+    }
+
     /// The path of a file that is named somewhere.
     fn resolve(&self, file: &str, named_at: &Place) -> PathBuf {
         if named_at.is_in_a_file() { self.folder().join(file) } else { file.into() }
@@ -119,10 +171,16 @@ impl Document {
                 remedy,
             ));
         }
+        if kind == Kind::Object && mesh::is_mesh(name) {
+            let remedy = format!("`blindgrasp object new {name}` writes an object's file that names it");
+            return Err(SceneError::new("", "a mesh alone is no object: it has no unit and no mass", remedy));
+        }
         if is_path(name) {
             let path = folder.join(name);
             let text = read_text(&path, ".toml")?;
-            return Self::parse(&text, &path.to_string_lossy(), path.parent().unwrap_or(folder));
+            let document = Self::parse(&text, &path.to_string_lossy(), path.parent().unwrap_or(folder))?;
+            kind.refuse_others(&document.node)?;
+            return Ok(document);
         }
         match kind.built_in().iter().find(|(built_in, _)| *built_in == name) {
             Some((_, text)) => Ok(Self {
@@ -133,13 +191,18 @@ impl Document {
                 "",
                 format!("no built-in {} is called `{name}`", kind.word()),
                 suggestion(name, kind.built_in().iter().map(|(name, _)| *name))
-                    + " (a path has to end in .toml or contain a /)",
+                    + match kind {
+                        Kind::Object => {
+                            " (a path has to end in .toml or contain a /; of meshes, .stl and .obj are read)"
+                        }
+                        _ => " (a path has to end in .toml or contain a /)",
+                    },
             )),
         }
     }
 
-    /// Applies settings, follows the references of a scene, and fills in the URDF and the defaults of its hand. Settings of
-    /// what a reference names come before it is followed, all others after.
+    /// Applies settings, follows the references of a scene, and fills in the URDF and the defaults of its hand and the mesh
+    /// of its object. Settings of what a reference names come before it is followed, all others after; the mesh comes last.
     pub(super) fn complete_scene(
         mut self,
         settings: &[Setting],
@@ -150,6 +213,7 @@ impl Document {
         for setting in settings.iter().filter(is_reference) {
             self.node.set(setting)?;
         }
+        let mut object_home = self.home.clone();
         for (key, kind) in [("hand", Kind::Hand), ("object", Kind::Object)] {
             let Some(node) = self.node.get_mut(key) else { continue };
             let mut home = self.home.clone();
@@ -165,6 +229,8 @@ impl Document {
                 }
                 let Some(hand) = self.node.get_mut(key) else { continue };
                 complete_hand(hand, &home, notices).map_err(|error| error.below(key))?;
+            } else {
+                object_home = home;
             }
         }
         for setting in settings.iter().filter(|setting| !is_reference(setting) && !is_of_urdf(setting)) {
@@ -174,7 +240,17 @@ impl Document {
             }
             self.node.set(setting)?;
         }
+        if let Some(object) = self.node.get_mut("object") {
+            mesh::expand(object, &object_home, notices).map_err(|error| error.below("object"))?;
+        }
         Ok(self.node)
+    }
+
+    /// An object's tree, with its mesh filled in.
+    pub(super) fn complete_object(self, notices: &mut Vec<Notice>) -> Result<Node, SceneError> {
+        let Self { mut node, home } = self;
+        mesh::expand(&mut node, &home, notices)?;
+        Ok(node)
     }
 
     /// A hand's tree, with its URDF and its defaults filled in.
@@ -208,8 +284,24 @@ fn complete_hand(node: &mut Node, home: &Home, notices: &mut Vec<Notice>) -> Res
     Ok(())
 }
 
+/// Reads a text file of a kind.
+pub(super) fn read_text(path: &Path, ending: &str) -> Result<String, SceneError> {
+    let place = Place::whole(&path.to_string_lossy());
+    let bytes = read_bytes(path, ending, if ending == ".toml" { LARGEST_TOML } else { LARGEST_FILE })?;
+    let values = bytes.iter().filter(|&&byte| byte == b',' || byte == b'\n').count();
+    if values > MOST_VALUES {
+        let problem = format!("{values} values are too many");
+        return Err(SceneError::new("", problem, "check the path").at(&place));
+    }
+    String::from_utf8(bytes).map_err(|error| {
+        let valid = &error.as_bytes()[..error.utf8_error().valid_up_to()];
+        let line = 1 + valid.iter().filter(|&&byte| byte == b'\n').count();
+        SceneError::new("", "not UTF-8 text", "save it as UTF-8").at(&Place { line, ..place })
+    })
+}
+
 /// Reads a file of a kind.
-fn read_text(path: &Path, ending: &str) -> Result<String, SceneError> {
+fn read_bytes(path: &Path, ending: &str, largest: u64) -> Result<Vec<u8>, SceneError> {
     let place = Place::whole(&path.to_string_lossy());
     let fail = |problem: String, remedy: &str| SceneError::new("", problem, remedy).at(&place);
     let unreadable = |error: std::io::Error| {
@@ -224,17 +316,10 @@ fn read_text(path: &Path, ending: &str) -> Result<String, SceneError> {
     if !metadata.is_file() {
         return Err(fail("not a file".into(), &format!("name a {ending} file")));
     }
-    if metadata.len() > LARGEST_FILE {
+    if metadata.len() > largest {
         return Err(fail(format!("{} MiB are too many", metadata.len() >> 20), "check the path"));
     }
-    let bytes = std::fs::read(path).map_err(unreadable)?;
-    String::from_utf8(bytes).map_err(|error| {
-        let line = 1 + error.as_bytes()[..error.utf8_error().valid_up_to()]
-            .iter()
-            .filter(|&&byte| byte == b'\n')
-            .count();
-        fail("not UTF-8 text".into(), "save it as UTF-8").at_line(line)
-    })
+    std::fs::read(path).map_err(unreadable)
 }
 
 impl SceneError {
@@ -252,13 +337,6 @@ impl SceneError {
     fn below(mut self, key: &str) -> Self {
         if !self.key.is_empty() {
             self.key = format!("{key}.{}", self.key);
-        }
-        self
-    }
-
-    fn at_line(mut self, line: usize) -> Self {
-        if let Some(place) = &mut self.place {
-            place.line = line;
         }
         self
     }

@@ -18,6 +18,7 @@ mod hand;
 mod hand_model;
 pub mod inverse_kinematics;
 mod library;
+pub mod mesh;
 mod object;
 mod read;
 mod source;
@@ -49,6 +50,7 @@ pub use hand_model::HandModel;
 pub use object::ObjectBody;
 pub(crate) use object::breaks_triangle;
 pub use source::config_source;
+pub use urdf::{FingertipRequest, Starter, StarterRequest};
 
 /// A scene, checked and ready for the simulator.
 #[derive(Clone, Debug, PartialEq)]
@@ -279,7 +281,44 @@ impl ObjectFile {
     /// # Errors
     /// What is wrong with the file as a file; a [`Scene`] checks the numbers.
     pub fn load(name_or_path: &str) -> Result<Self, SceneError> {
-        read::read(&open(Kind::Object, name_or_path)?.node, "")
+        Self::load_with_notices(name_or_path).map(|(file, _)| file)
+    }
+
+    /// Reads an object from a text. `source` is its name in errors; its mesh is relative to `folder`.
+    ///
+    /// # Errors
+    /// As [`Self::load`].
+    pub fn parse(text: &str, source: &str, folder: &Path) -> Result<Self, SceneError> {
+        read::read(&Document::parse(text, source, folder)?.complete_object(&mut Vec::new())?, "")
+    }
+
+    /// As [`Self::load`], with what its mesh was repaired of.
+    ///
+    /// # Errors
+    /// As [`Self::load`].
+    pub fn load_with_notices(name_or_path: &str) -> Result<(Self, Vec<Notice>), SceneError> {
+        Self::load_with_places(name_or_path).map(|(file, places)| (file, places.notices))
+    }
+
+    /// Loads an object and checks its numbers; with what is odd in it, in words.
+    ///
+    /// # Errors
+    /// One line: where, which key, what is wrong, what to do.
+    pub fn load_checked(name_or_path: &str) -> Result<(Self, Vec<String>), SceneError> {
+        let (file, places) = Self::load_with_places(name_or_path)?;
+        let mut warnings: Vec<String> = places.notices.iter().map(Notice::to_string).collect();
+        file.body(&mut warnings).map_err(|error| {
+            let place = places.of(&error.key);
+            error.at(&place)
+        })?;
+        Ok((file, warnings))
+    }
+
+    /// The same, with where its values come from.
+    pub(crate) fn load_with_places(name_or_path: &str) -> Result<(Self, Places), SceneError> {
+        let mut notices = Vec::new();
+        let tree = open(Kind::Object, name_or_path)?.complete_object(&mut notices)?;
+        Ok((read::read(&tree, "")?, Places { tree, notices }))
     }
 }
 

@@ -1,12 +1,15 @@
 //! The object of a scene: its shape, mass and inertia.
 
 use super::{
-    check::{Result, all_within, fail, within},
+    check::{Result, all_within, fail, name, schema, within},
     error::SceneError,
     file::{InertiaFile, ObjectFile, ShapeFile},
 };
-use crate::plant::polyhedron::{Polyhedron, PolyhedronError};
+use crate::plant::polyhedron::{Flatness, Polyhedron, PolyhedronError, diagonal_m};
 use nalgebra::{Matrix3, SymmetricEigen, Vector3};
+
+/// How far parts of a face of a mesh may be off its plane, in units of the body's diagonal, where the file does not say.
+const FLAT: f64 = 1e-3;
 
 /// An object, checked.
 #[derive(Clone, Debug, PartialEq)]
@@ -19,8 +22,26 @@ pub struct ObjectBody {
     pub inertia_kg_m2: Matrix3<f64>,
 }
 
+impl ObjectFile {
+    /// Shape, mass and inertia, with what is odd about them. A shape alone, without mass and density, weighs what water does.
+    ///
+    /// # Errors
+    /// What is wrong, with the key in the object's file.
+    pub fn body(&self, warnings: &mut Vec<String>) -> Result<ObjectBody> {
+        schema("schema", self.schema)?;
+        name("name", &self.name)?;
+        let bare = self.mass_kg.is_none() && self.density_kg_m3.is_none();
+        let weighed =
+            ObjectFile { density_kg_m3: bare.then_some(1000.0).or(self.density_kg_m3), ..self.clone() };
+        object(&weighed, warnings).map_err(|mut error| {
+            error.key = error.key.trim_start_matches("object.").to_owned();
+            error
+        })
+    }
+}
+
 /// The polyhedron of a shape.
-fn polyhedron(shape: &ShapeFile) -> std::result::Result<Polyhedron, PolyhedronError> {
+pub(super) fn polyhedron(shape: &ShapeFile) -> std::result::Result<Polyhedron, PolyhedronError> {
     match shape {
         ShapeFile::Box { size_m } => Polyhedron::cuboid(*size_m),
         ShapeFile::Prism { sides, side_m, height_m } => {
@@ -31,26 +52,41 @@ fn polyhedron(shape: &ShapeFile) -> std::result::Result<Polyhedron, PolyhedronEr
             let points: Vec<Vector3<f64>> = points_m.iter().map(|&point| point.into()).collect();
             Polyhedron::hull(&points)
         }
+        ShapeFile::Pyramid { sides, side_m, height_m } => {
+            Polyhedron::regular_pyramid(*sides as usize, *side_m, *height_m)
+        }
+        ShapeFile::Mesh { vertices_m, triangles, flat_deg, flat_m } => {
+            let vertices: Vec<Vector3<f64>> = vertices_m.iter().map(|&vertex| vertex.into()).collect();
+            let distance_m = flat_m.unwrap_or_else(|| FLAT * diagonal_m(&vertices));
+            let flatness = Flatness { angle_rad: flat_deg.to_radians(), distance_m };
+            Polyhedron::mesh(&vertices, triangles, &flatness)
+        }
     }
 }
 
 /// Checks an object and computes its mass and inertia.
 pub(super) fn object(file: &ObjectFile, warnings: &mut Vec<String>) -> Result<ObjectBody> {
+    if let ShapeFile::Mesh { flat_deg, flat_m, .. } = &file.shape {
+        within("object.shape.mesh.flat_deg", *flat_deg, 0.0, 45.0)?;
+        within("object.shape.mesh.flat_m", flat_m.unwrap_or_default(), 0.0, 1.0)?;
+    }
     let shape = polyhedron(&file.shape).map_err(|error| {
         let key = match file.shape {
             ShapeFile::Box { .. } => "object.shape.box.size_m",
             ShapeFile::Prism { .. } => "object.shape.prism",
             ShapeFile::PolygonPrism { .. } => "object.shape.polygon_prism",
             ShapeFile::Hull { .. } => "object.shape.hull.points_m",
+            ShapeFile::Pyramid { .. } => "object.shape.pyramid",
+            ShapeFile::Mesh { .. } => "object.shape.mesh",
         };
-        SceneError::new(key, error.to_string(), "describe a convex body in metres")
+        SceneError::new(key, error.to_string(), error.remedy())
     })?;
     let radius = shape.radius_m();
     if !(1e-4..=10.0).contains(&radius) {
         return fail(
             "object.shape",
             format!("reaches {radius:.3e} m from its centre of mass"),
-            "give lengths in metres, between 0.1 mm and 10 m",
+            "has to be between 0.1 mm and 10 m: give lengths in metres, and a mesh its unit",
         );
     }
     let uniform = shape.mass_properties();

@@ -2,6 +2,7 @@
 
 use super::{
     error::{SceneError, suggestion},
+    file::SCHEMA,
     tree::{Entry, Node, Value},
 };
 use serde::de::{self, Deserialize, Deserializer, IntoDeserializer, Unexpected, Visitor};
@@ -56,6 +57,7 @@ impl de::Error for SceneError {
         let remedy = match field {
             "contact" | "joint" | "fingertip" => format!("add a [[{field}]]"),
             "pose" | "control" | "shape" => format!("add a [{field}]"),
+            "schema" => format!("add `schema = {SCHEMA}`"),
             _ => format!("add `{field} = ...`"),
         };
         Self::new(field, "is missing", remedy)

@@ -17,6 +17,9 @@ use nalgebra::{Matrix3, Quaternion, UnitQuaternion, Vector3};
 /// How far a contact point may lie off its face before it is an error, m; closer, it is moved onto the face.
 const OFF_FACE_M: f64 = 1e-6;
 
+/// Room that a fingertip needs from parts of the object beside its face, m: what the search for the posture leaves open.
+const CLEAR_M: f64 = 1e-9;
+
 impl PoseFile {
     /// The attitude, checked.
     pub(crate) fn attitude(&self) -> Result<UnitQuaternion<f64>> {
@@ -103,6 +106,7 @@ pub(super) fn start(
     if let Some(angles) = &file.start.angles_rad {
         check_angles(file, hand, angles)?;
         let indentations_m = touch(file, hand, shape, &mut contacts, angles, &position_m, &attitude)?;
+        unobstructed(file, shape, &contacts, &indentations_m)?;
         let points_m = contacts.iter().map(|touch| touch.point_m).collect();
         let start = Start { angles_rad: angles.clone(), position_m, attitude, indentations_m, points_m };
         return Ok((contacts.iter().map(|touch| touch.on).collect(), start));
@@ -140,6 +144,7 @@ pub(super) fn start(
             );
         }
     }
+    unobstructed(file, shape, &contacts, &indentations_m)?;
     let targets: Vec<Vector3<f64>> = (0..points.len())
         .map(|i| position_m + attitude * (points[i] - inwards[i] * (radii[i] - indentations_m[i])))
         .collect();
@@ -227,6 +232,33 @@ fn touches(file: &SceneFile, shape: &Polyhedron) -> Result<Vec<Touch>> {
         });
     }
     Ok(contacts)
+}
+
+/// Whether every fingertip touches its face alone. Where a body is not convex, it may come to another part of it.
+fn unobstructed(
+    file: &SceneFile,
+    shape: &Polyhedron,
+    touches: &[Touch],
+    indentations_m: &[f64],
+) -> Result<()> {
+    for (i, (touch, indentation)) in touches.iter().zip(indentations_m).enumerate() {
+        let fingertip = &file.hand.fingertips[i];
+        let centre = touch.point_m - touch.on.frame.column(1) * (fingertip.radius_m - indentation);
+        let room = shape.clearance_m(touch.on.face, &centre) - fingertip.radius_m;
+        if !(room > CLEAR_M) {
+            return fail(
+                format!("contact.{}", i + 1),
+                format!(
+                    "fingertip `{}` would reach {:.3} mm into another part of the object than face {}",
+                    fingertip.name,
+                    -room * 1e3,
+                    touch.on.face
+                ),
+                "move the contact point away from what rises beside the face, or choose another face",
+            );
+        }
+    }
+    Ok(())
 }
 
 fn check_angles(file: &SceneFile, hand: &Hand, angles: &[f64]) -> Result<()> {

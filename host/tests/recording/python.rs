@@ -147,3 +147,43 @@ fn python_reads_the_same_values() {
         assert_eq!(told["metadata"]["interface_version"], "3");
     }
 }
+
+#[test]
+#[ignore = "needs the Python packages mcap and mcap-protobuf-support, which tests/run gets"]
+fn the_example_in_python_reads_what_a_simulation_wrote() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.mcap");
+    let command = |program: &str, arguments: &[&str]| {
+        let output = Command::new(program)
+            .args(arguments)
+            .arg(&path)
+            .current_dir(Path::new(env!("CARGO_MANIFEST_DIR")).join(".."))
+            .output()
+            .unwrap();
+        let [out, err] = [output.stdout, output.stderr].map(|bytes| String::from_utf8(bytes).unwrap());
+        (output.status.code(), out, err)
+    };
+    let (code, _, err) = command(
+        env!("CARGO_BIN_EXE_blindgrasp"),
+        &["sim", "allegro-like-prism", "--duration", "0.5", "--out"],
+    );
+    assert_eq!(code, Some(0), "{err}");
+    let example = "examples/python/read_recording.py";
+    let signal = ["--joint", "thumb_flex_1", "--signal", "angle_rad", "--every", "100"];
+    let (code, out, err) = command("python3", &[&[example], &signal[..]].concat());
+    assert_eq!(code, Some(0), "{err}");
+    let lines: Vec<&str> = out.lines().collect();
+    assert!(lines[0].contains("hand allegro-like (") && lines[0].contains("thumb-flex-1"), "{out}");
+    assert!(lines.iter().any(|line| line.contains("parameters")), "{out}");
+    // The tick that arms the hand, the one at time 0, and 500 more.
+    assert_eq!(lines.last(), Some(&"502 records"), "{out}");
+    let angles: Vec<f64> = lines
+        .iter()
+        .filter_map(|line| line.split_once("thumb_flex_1 ")?.1.strip_suffix(" rad")?.parse().ok())
+        .collect();
+    assert_eq!(angles.len(), 6, "{out}");
+    assert!(angles.iter().all(|angle| (0.5..1.5).contains(angle)), "{angles:?}");
+    let (code, _, err) = command("python3", &[example, "--joint", "no_such"]);
+    assert_eq!(code, Some(1));
+    assert!(err.contains("no joint is called no_such: index_turn, "), "{err}");
+}

@@ -3,9 +3,11 @@
 use super::super::Outcome;
 use anyhow::Context;
 use blindgrasp::inspect::finding::Verdict;
-use blindgrasp::inspect::hand::HandCheck;
+use blindgrasp::inspect::hand::{HandCheck, NominalHand};
+use blindgrasp::report;
 use clap::Args;
 use std::io::{self, Write as _};
+use std::path::PathBuf;
 
 /// Show what a hand is (tree, joints, reach, masses, forces) and find what is wrong with it
 ///
@@ -20,6 +22,9 @@ pub(crate) struct Arguments {
     /// Print everything as one JSON object
     #[arg(long)]
     json: bool,
+    /// Draw the hand at its nominal posture and write the picture (SVG) to this file, which is replaced
+    #[arg(long, value_name = "FILE.svg")]
+    picture: Option<PathBuf>,
 }
 
 /// Runs the command.
@@ -27,5 +32,17 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
     let check = HandCheck::load(&arguments.file)?;
     let text = if arguments.json { serde_json::to_string(&check)? + "\n" } else { check.text() };
     io::stdout().lock().write_all(text.as_bytes()).context("cannot print the findings")?;
+    if let Some(path) = &arguments.picture {
+        match &check.nominal {
+            Some(NominalHand { hand, joint_names, angles_rad }) => {
+                let svg = report::hand_svg(&check.name, hand, joint_names, angles_rad);
+                std::fs::write(path, svg).with_context(|| format!("cannot write {}", path.display()))?;
+                eprintln!("blindgrasp: wrote {}", path.display());
+            }
+            None => {
+                eprintln!("blindgrasp: no picture: it is not known what sits on what; mend the errors first")
+            }
+        }
+    }
     Ok(if check.verdict == Verdict::Broken { Outcome::Failed } else { Outcome::Shown })
 }

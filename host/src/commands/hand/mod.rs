@@ -2,11 +2,12 @@
 
 mod check;
 mod export;
+mod new;
 
 use super::Outcome;
 use clap::{Args, Subcommand};
 
-/// Hands: check one, or write a URDF of it
+/// Hands: start one from a URDF, check one, write one as a URDF
 #[derive(Args)]
 #[command(arg_required_else_help = true)]
 pub(crate) struct Arguments {
@@ -16,6 +17,7 @@ pub(crate) struct Arguments {
 
 #[derive(Subcommand)]
 enum Action {
+    New(new::Arguments),
     Check(check::Arguments),
     Export(export::Arguments),
 }
@@ -23,6 +25,7 @@ enum Action {
 /// Runs the command.
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
     match &arguments.action {
+        Action::New(arguments) => new::run(arguments),
         Action::Check(arguments) => check::run(arguments),
         Action::Export(arguments) => export::run(arguments),
     }

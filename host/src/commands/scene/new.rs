@@ -78,9 +78,6 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
         );
     }
     let parts = Parts::of(&like)?;
-    for warning in &parts.warnings {
-        eprintln!("blindgrasp: warning: {warning}");
-    }
     let reach = Reach::of_scene(&like, &parts)?;
     let request = Request {
         like: &like,
@@ -122,8 +119,11 @@ fn shown_path(path: &Path) -> String {
 
 /// The scene that is asked for, without a placement.
 fn scene_like(arguments: &Arguments) -> anyhow::Result<SceneFile> {
-    let (hand, _, _) = HandFile::load_checked(&arguments.hand)?;
-    let object = ObjectFile::load(&arguments.object)?;
+    let (hand, _, notices) = HandFile::load_checked(&arguments.hand)?;
+    let (object, more) = ObjectFile::load_checked(&arguments.object)?;
+    for warning in notices.iter().chain(&more) {
+        eprintln!("blindgrasp: warning: {warning}");
+    }
     let mut like = template(hand, object, arguments.ideal)?;
     if let Some(force_n) = arguments.force_n {
         like.control.force_n = force_n;

@@ -2,6 +2,7 @@
 
 use super::rules::length;
 use super::{HandCheck, JointFacts, MeetingFacts};
+use crate::scene::one_line;
 use std::fmt::Write as _;
 
 /// All of it.
@@ -21,7 +22,8 @@ pub(super) fn describe(check: &HandCheck) -> String {
         text = text + &line + "\n";
     }
     let _ = writeln!(text, "{}", check.findings.summary());
-    text
+    // Names come from files, and may contain what would steer a terminal.
+    text.lines().map(|line| one_line(line) + "\n").collect()
 }
 
 /// What sits on what.

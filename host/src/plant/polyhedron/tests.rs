@@ -1,23 +1,10 @@
+mod clearance;
+mod masses;
+mod meshes;
+
+use super::samples::Numbers;
 use super::*;
-use nalgebra::{Rotation3, UnitQuaternion};
-
-/// A sequence of numbers in [0, 1) that is the same everywhere.
-struct Numbers(u64);
-
-impl Numbers {
-    fn next(&mut self) -> f64 {
-        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        (self.0 >> 11) as f64 / (1u64 << 53) as f64
-    }
-
-    fn vector(&mut self) -> Vector3<f64> {
-        Vector3::from_fn(|_, _| 2.0 * self.next() - 1.0)
-    }
-
-    fn rotation(&mut self) -> Rotation3<f64> {
-        UnitQuaternion::from_scaled_axis(self.vector() * 3.0).to_rotation_matrix()
-    }
-}
+use blindgrasp_shared::math::Real;
 
 fn assert_close(a: f64, b: f64, tolerance: f64) {
     assert!((a - b).abs() <= tolerance * b.abs().max(a.abs()), "{a} {b}");

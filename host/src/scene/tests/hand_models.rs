@@ -25,7 +25,15 @@ fn line(of: &str) -> usize {
 
 #[test]
 fn shipped_hands_are_models_without_warnings() {
-    for (name, size) in [("three-finger", (12, 3)), ("two-finger", (8, 2))] {
+    let sizes = [
+        ("three-finger", (12, 3)),
+        ("hand-arm", (18, 3)),
+        ("two-finger", (8, 2)),
+        ("four-finger", (16, 4)),
+        ("allegro-like", (16, 4)),
+    ];
+    assert!(HandFile::built_in().eq(sizes.iter().map(|(name, _)| *name)));
+    for (name, size) in sizes {
         let model = HandModel::load(name).unwrap_or_else(|error| panic!("{error}"));
         assert_eq!(model.name, name);
         assert_eq!((model.hand.joint_count(), model.hand.fingertip_count()), size);
@@ -34,13 +42,15 @@ fn shipped_hands_are_models_without_warnings() {
     }
 }
 
-/// The scenes with the paper's experiments say the same as the hand itself, but for what only a real hand has.
+/// The scenes with the experiment's model say the same as the hand itself, but for what only a real hand has.
 #[test]
 fn a_model_has_the_configuration_of_its_experiments() {
-    for (scene, hand) in
-        [("prism", "three-finger"), ("cube", "three-finger"), ("two-finger-prism", "two-finger")]
-    {
-        let (scene, model) = (load(scene, &[]).unwrap(), HandModel::load(hand).unwrap());
+    for name in Scene::built_in() {
+        let scene = load(name, &[]).unwrap();
+        if scene.sensors.ideal {
+            continue;
+        }
+        let model = HandModel::load(&scene.file.hand.name).unwrap();
         assert_eq!(model.hand, scene.hand);
         let mut expected = scene.controller_config();
         assert_eq!((expected.faults.heartbeat_ms, expected.faults.late_ticks), (None, None));
@@ -103,8 +113,8 @@ fn hands_that_no_firmware_can_be_built_with_are_refused() {
         "h.toml:7: schema: 2 is a format that this program does not know; write it as format 1"
     );
     assert_eq!(
-        HandModel::load("four-finger").unwrap_err().to_string(),
-        "four-finger: no built-in hand is called `four-finger`; did you mean `two-finger`? (a path has to end in .toml or contain a /)"
+        HandModel::load("five-finger").unwrap_err().to_string(),
+        "five-finger: no built-in hand is called `five-finger`; did you mean `four-finger`? (a path has to end in .toml or contain a /)"
     );
     assert_eq!(
         HandModel::load("models/no.toml").unwrap_err().to_string(),

@@ -187,8 +187,8 @@ fn errors_in_hands_and_objects_name_their_file() {
             "--set: hand.fingertip.1.link: there is no joint `wrist`; known: finger-1-abduct, finger-1-flex-1, finger-1-flex-2, finger-1-flex-3, finger-2-abduct, finger-2-flex-1, finger-2-flex-2, finger-2-flex-3, finger-3-abduct, finger-3-flex-1, finger-3-flex-2, finger-3-flex-3",
         ),
         (
-            "hand=four-finger",
-            "--set: hand: no built-in hand is called `four-finger`; did you mean `two-finger`? (a path has to end in .toml or contain a /)",
+            "hand=five-finger",
+            "--set: hand: no built-in hand is called `five-finger`; did you mean `four-finger`? (a path has to end in .toml or contain a /)",
         ),
         (
             "object.mass_kg=0",
@@ -208,16 +208,16 @@ fn errors_in_hands_and_objects_name_their_file() {
         ),
         (
             "object.shape.box.size_m.1=48",
-            "objects/cube.toml:8: object.shape: reaches 2.400e1 m from its centre of mass; give lengths in metres, between 0.1 mm and 10 m",
+            "objects/cube.toml:8: object.shape: reaches 2.400e1 m from its centre of mass; has to be between 0.1 mm and 10 m: give lengths in metres, and a mesh its unit",
         ),
         ("object.shape.box.sze=1", "--set: object.shape.box.sze: unknown key; did you mean `size_m`?"),
         (
             "object.shape.prsm.side_m=1",
-            "objects/cube.toml:8: object.shape: has 2 keys; give one of box, prism, polygon_prism, hull",
+            "objects/cube.toml:8: object.shape: has 2 keys; give one of box, prism, polygon_prism, hull, pyramid, mesh",
         ),
         (
-            "object.shape={pyramid = {}}",
-            "--set: object.shape.pyramid: `pyramid` is unknown; known: box, prism, polygon_prism, hull",
+            "object.shape={cylinder = {}}",
+            "--set: object.shape.cylinder: `cylinder` is unknown; known: box, prism, polygon_prism, hull, pyramid, mesh",
         ),
         (
             "object.shape={hull={points_m=[[0,0,0],[1,0,0],[0,1,0],[1,1,0]]}}",

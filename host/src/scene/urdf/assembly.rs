@@ -12,9 +12,13 @@ use super::robot::{Joint, Kind, Robot};
 use super::topology::Tree;
 use super::transform::{Transform, roll_pitch_yaw};
 use super::xml::quote;
+use crate::MAX_JOINTS;
 use blindgrasp_shared::math::Real;
 use nalgebra::{Quaternion, UnitQuaternion};
 use std::collections::BTreeMap;
+
+/// Joints that are named in a message.
+pub(super) const MOST_NAMES: usize = 6;
 
 /// A hand's joints and bodies.
 #[derive(Clone, Debug)]
@@ -61,55 +65,91 @@ impl Assembly {
         fingertips: &[usize],
         notices: &mut Vec<Notice>,
     ) -> Result<Self> {
-        let base = base(robot, tree, keys)?;
-        let held = held(robot, keys)?;
         let mut moves_fingertip = vec![false; robot.joints.len()];
         for &link in fingertips {
             tree.above(link, robot).for_each(|joint| moves_fingertip[joint] = true);
         }
-        let is_free =
-            |k: usize| robot.joints[k].kind != Kind::Fixed && !held.contains_key(&k) && moves_fingertip[k];
-        let below = tree.below(base, robot);
-        let free: Vec<usize> =
-            below.iter().skip(1).filter_map(|&link| tree.carrier[link]).filter(|&k| is_free(k)).collect();
-        refuse_unfit(robot, &free)?;
+        let mut assembly = Self::put_together(robot, tree, keys, |k| moves_fingertip[k])?;
+        refuse_unfit(robot, &assembly.joints)?;
+        refuse_crowd(robot, assembly.joints.len())?;
+        assembly.merge(robot, true)?;
+        notices.extend(tell_idle(robot, &assembly.idle(robot, keys)));
+        Ok(assembly)
+    }
 
+    /// The same with every joint that is not to be held still, of whatever kind and number; a mass that can't be read is none.
+    ///
+    /// # Errors
+    /// A base or a joint to hold still that is not there.
+    pub(super) fn of_all(robot: &Robot, tree: &Tree, keys: &Keys) -> Result<Self> {
+        let mut assembly = Self::put_together(robot, tree, keys, |_| true)?;
+        assembly.merge(robot, false)?;
+        Ok(assembly)
+    }
+
+    /// Of the joints that are neither fixed nor to be held still, those move that are to.
+    fn put_together(
+        robot: &Robot,
+        tree: &Tree,
+        keys: &Keys,
+        is_to_move: impl Fn(usize) -> bool,
+    ) -> Result<Self> {
+        let base = base(robot, tree, keys)?;
+        let held = held(robot, keys)?;
+        let is_free =
+            |k: usize| robot.joints[k].kind != Kind::Fixed && !held.contains_key(&k) && is_to_move(k);
+        let on_base = Seat { joint: None, frame: None };
         let mut assembly = Self { joints: Vec::new(), seats: vec![None; robot.links.len()] };
-        let mut bodies: Vec<Vec<Body>> = Vec::new();
-        let mut idle = Vec::new();
-        for &link in &below {
-            let carrier = tree.carrier[link].filter(|_| link != base);
-            let seat = match carrier {
-                None => Seat { joint: None, frame: None },
+        for link in tree.below(base, robot) {
+            let seat = match tree.carrier[link].filter(|_| link != base) {
+                None => on_base,
                 Some(k) => {
                     let joint = &robot.joints[k];
-                    let on = assembly.seats[joint.parent].unwrap_or(Seat { joint: None, frame: None });
+                    let on = assembly.seats[joint.parent].unwrap_or(on_base);
                     if is_free(k) {
-                        bodies.push(Vec::new());
                         assembly.joints.push(Moving::new(k, joint, &on));
                         Seat { joint: Some(assembly.joints.len() - 1), frame: None }
                     } else {
-                        let position = held.get(&k).copied();
-                        if position.is_none() && joint.kind != Kind::Fixed {
-                            idle.push(k);
-                        }
-                        let still = joint.origin.transform.then(&motion(joint, position));
+                        let still = joint.origin.transform.then(&motion(joint, held.get(&k).copied()));
                         let frame = on.frame.map_or(still, |frame| frame.then(&still));
                         Seat { joint: on.joint, frame: Some(frame) }
                     }
                 }
             };
             assembly.seats[link] = Some(seat);
-            if let Some(joint) = seat.joint {
-                let body = &robot.links[link].body;
-                bodies[joint].push(seat.frame.map_or(*body, |frame| body.seen_from(&frame)));
+        }
+        Ok(assembly)
+    }
+
+    /// Takes together what each joint carries. Masses of links that do not move may be wrong; others too, if not `all` count.
+    fn merge(&mut self, robot: &Robot, all: bool) -> Result<()> {
+        let mut bodies: Vec<Vec<Body>> = vec![Vec::new(); self.joints.len()];
+        for (link, seat) in robot.links.iter().zip(&self.seats) {
+            let Some(Seat { joint: Some(joint), frame }) = *seat else { continue };
+            match &link.body {
+                Ok(body) => bodies[joint].push(frame.map_or(*body, |frame| body.seen_from(&frame))),
+                Err(error) if all => return Err(error.clone()),
+                Err(_) => {}
             }
         }
-        for (moving, bodies) in assembly.joints.iter_mut().zip(&bodies) {
+        for (moving, bodies) in self.joints.iter_mut().zip(&bodies) {
             moving.body = Body::merged(bodies);
         }
-        notices.extend(tell_idle(robot, &idle));
-        Ok(assembly)
+        Ok(())
+    }
+
+    /// The robot's joints that could move, but move no fingertip; in the file's order.
+    pub(super) fn idle(&self, robot: &Robot, keys: &Keys) -> Vec<usize> {
+        let is_idle = |k: &usize| {
+            let joint = &robot.joints[*k];
+            joint.kind != Kind::Fixed
+                && self.seats[joint.parent].is_some()
+                && self.seats[joint.child].is_some()
+                && self.joints.iter().all(|moving| moving.joint != *k)
+                && !keys.locked_rad.contains_key(&joint.name)
+                && !keys.locked_m.contains_key(&joint.name)
+        };
+        (0..robot.joints.len()).filter(is_idle).collect()
     }
 }
 
@@ -197,9 +237,9 @@ fn motion(joint: &Joint, position: Option<f64>) -> Transform {
 }
 
 /// Refuses joints that move a fingertip and are not of a kind that the law is for.
-fn refuse_unfit(robot: &Robot, free: &[usize]) -> Result<()> {
+fn refuse_unfit(robot: &Robot, moving: &[Moving]) -> Result<()> {
     let all = |unfit: &dyn Fn(&Joint) -> bool| -> Vec<&Joint> {
-        free.iter().map(|&k| &robot.joints[k]).filter(|joint| unfit(joint)).collect()
+        moving.iter().map(|moving| &robot.joints[moving.joint]).filter(|joint| unfit(joint)).collect()
     };
     let refuse = |joints: &[&Joint], problem: String, remedy: String| match joints {
         [] => Ok(()),
@@ -235,11 +275,24 @@ fn refuse_unfit(robot: &Robot, free: &[usize]) -> Result<()> {
     Ok(())
 }
 
-/// Joints by name, with `is` or `are`.
+fn refuse_crowd(robot: &Robot, count: usize) -> Result<()> {
+    if count <= MAX_JOINTS {
+        return Ok(());
+    }
+    let problem = format!("{count} joints move a fingertip: at most {MAX_JOINTS} are supported");
+    let remedy = "choose a `base` closer to the hand, hold joints still, or name fewer fingertips";
+    Err(SceneError::new("", problem, remedy).at(&robot.place))
+}
+
+/// Joints by name, the first few of many, with `is` or `are`.
 fn subject(joints: &[&Joint]) -> (String, &'static str) {
     let names: Vec<String> = joints.iter().map(|joint| format!("`{}`", quote(&joint.name))).collect();
     match names.len() {
         1 => (format!("joint {}", names[0]), "is"),
+        count if count > MOST_NAMES => {
+            let named = names[..MOST_NAMES].join(", ");
+            (format!("joints {named} and {} more", count - MOST_NAMES), "are")
+        }
         _ => (format!("joints {}", names.join(", ")), "are"),
     }
 }
@@ -258,7 +311,7 @@ fn hold(joints: &[&Joint], list: &str) -> String {
 }
 
 /// Where a joint is held of which it is not said: at zero, or the limit nearest to it.
-fn resting(joint: &Joint) -> f64 {
+pub(super) fn resting(joint: &Joint) -> f64 {
     let (lower, upper) = range(joint);
     0.0_f64.max(lower).min(upper)
 }

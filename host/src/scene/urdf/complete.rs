@@ -12,7 +12,7 @@ use nalgebra::Matrix3;
 use std::f64::consts::PI;
 
 /// Torques, N m, and speeds, rad/s, from which on a limit is taken for a placeholder.
-const PLACEHOLDER: f64 = 1000.0;
+pub(super) const PLACEHOLDER: f64 = 1000.0;
 
 /// Adds to the entry of a joint what the URDF says and the entry does not. `is_default` tells whether `[joint_defaults]` has a
 /// key, `parent_key` is that of the entry's parent.
@@ -46,10 +46,11 @@ pub(super) fn complete(
     add("mass_centre_m", list(&body.centre_m.into(), body_place));
     add("inertia_kg_m2", list(&moments(&body.inertia_kg_m2), body_place));
     let dynamics = &joint.dynamics;
-    let damping = parts.keys.heeded("damping", dynamics.damping);
-    let friction = parts.keys.heeded("friction", dynamics.friction);
-    for (key, value) in [("viscous_friction_nm_s_rad", damping), ("coulomb_friction_nm", friction)] {
-        if let Some(value) = value {
+    for (key, attribute, given) in [
+        ("viscous_friction_nm_s_rad", "damping", dynamics.damping),
+        ("coulomb_friction_nm", "friction", dynamics.friction),
+    ] {
+        if let Some(value) = parts.keys.heeded(attribute, given) {
             add(key, number(value, &dynamics.place));
         }
     }
@@ -80,19 +81,7 @@ pub(super) fn complete(
             }
         }
     }
-    if let (Some(friction), Some(Value::Float(torque))) =
-        (friction, node.get("torque_limit_nm").map(|node| &node.value))
-        && !(friction < *torque)
-    {
-        notices.push(Notice {
-            place: dynamics.place.clone(),
-            what: format!(
-                "{}: its friction of {friction:?} N m is more than its motor can turn against",
-                of(joint)
-            ),
-            remedy: "if it is a placeholder, add `ignore = [\"friction\", \"damping\"]` to [urdf]".into(),
-        });
-    }
+    notices.extend(too_much_friction(node, joint));
     for key in ["damping_gain_nm_s_rad", "encoder_counts_per_turn"] {
         if node.get(key).is_none() && !is_default(key) {
             return Err(
@@ -176,6 +165,32 @@ fn placeholder(joint: &Joint, key: &str, attribute: &str, value: f64, unit: &str
         place: joint.limit.place.clone(),
         what: format!("{}: {attribute} of {value:?} {unit} looks like a placeholder", of(joint)),
         remedy: format!("if so, give `{key}` in [joint_defaults] and `ignore = [\"{attribute}\"]` in [urdf]"),
+    })
+}
+
+/// Friction of the URDF that the motor can't overcome: it holds still, or never comes near its speed.
+fn too_much_friction(node: &Node, joint: &Joint) -> Option<Notice> {
+    let number = |key: &str| match node.get(key) {
+        Some(Node { value: Value::Float(value), place }) => Some((*value, place)),
+        _ => None,
+    };
+    let is_of_the_urdf = |(_, place): &(f64, &Place)| **place == joint.dynamics.place;
+    let (torque, _) = number("torque_limit_nm")?;
+    let friction = number("coulomb_friction_nm").filter(is_of_the_urdf).map(|(friction, _)| friction);
+    let damping = number("viscous_friction_nm_s_rad").filter(is_of_the_urdf).map(|(damping, _)| damping);
+    let what = match (friction, damping, number("speed_limit_rad_s")) {
+        (Some(friction), ..) if !(friction < torque) => {
+            format!("its friction of {friction:?} N m is more than its motor can turn against")
+        }
+        (_, Some(damping), Some((speed, _))) if !(damping * speed < torque) => {
+            format!("its damping of {damping:?} N m s/rad leaves its motor nothing at {speed:?} rad/s")
+        }
+        _ => return None,
+    };
+    Some(Notice {
+        place: joint.dynamics.place.clone(),
+        what: format!("{}: {what}", of(joint)),
+        remedy: "if it is a placeholder, add `ignore = [\"friction\", \"damping\"]` to [urdf]".into(),
     })
 }
 

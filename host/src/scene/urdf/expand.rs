@@ -12,7 +12,6 @@ use super::keys::Keys;
 use super::robot::{Joint, Kind, Robot};
 use super::topology::Tree;
 use super::xml::quote;
-use crate::MAX_JOINTS;
 
 /// The file that a hand's `[urdf]` names.
 pub(in crate::scene) fn file_of(hand: &Node) -> Option<&Node> {
@@ -113,12 +112,6 @@ impl Parts<'_> {
     /// The array `joint`: in its own order if it is there, else in the tree's.
     fn add_joints(&self, hand: &mut Node, notices: &mut Vec<Notice>) -> Result<()> {
         let count = self.assembly.joints.len();
-        if count > MAX_JOINTS {
-            let problem =
-                format!("{count} joints of the URDF move a fingertip: at most {MAX_JOINTS} are supported");
-            let remedy = "hold some still with `locked_rad`, or use fewer fingertips";
-            return Err(SceneError::new("", problem, remedy).at(self.place));
-        }
         let entries = match hand.take("joint") {
             None => self.in_tree_order(),
             Some(Entry { node: Node { value: Value::Array(items), .. }, .. }) => self.in_own_order(items)?,

@@ -14,9 +14,9 @@ const SLENDERNESS: f64 = 0.15;
 const THINNER: f64 = 0.7;
 /// Shorter bones are not drawn, m.
 const SHORTEST_BONE_M: f64 = 1e-4;
-/// Mass, kg, and moments of inertia, kg m^2, of a link that has none of its own. PyBullet (3.2.7) takes one kilogram where
-/// nothing is said, and MuJoCo (4.0) refuses moving bodies of less than 1e-15.
-const NEXT_TO_NOTHING: f64 = 1e-14;
+/// Mass of a link that has none of its own, kg, and its moments of inertia, kg m^2. Where nothing is said, PyBullet (3.2.7)
+/// takes 1 kg and 1 kg m^2; MuJoCo (4.0) refuses moving bodies of less than 1e-15 kg or 1e-14 kg m^2.
+const NEXT_TO_NOTHING: (f64, f64) = (2e-15, 1.1e-14);
 /// Name of the link that is the base frame.
 const BASE: &str = "base";
 
@@ -109,8 +109,8 @@ impl<'a> Export<'a> {
     fn inertial(&mut self, mass_kg: f64, centre_m: &[f64; 3], moments: &[f64; 6]) {
         let is_massless = mass_kg == 0.0 && moments.iter().all(|moment| *moment == 0.0);
         let (mass_kg, [xx, yy, zz, xy, xz, yz]) = if is_massless {
-            let moment = NEXT_TO_NOTHING;
-            (NEXT_TO_NOTHING, [moment, moment, moment, 0.0, 0.0, 0.0])
+            let (mass_kg, moment) = NEXT_TO_NOTHING;
+            (mass_kg, [moment, moment, moment, 0.0, 0.0, 0.0])
         } else {
             (mass_kg, *moments)
         };

@@ -23,6 +23,7 @@ mod export;
 mod keys;
 mod reader;
 mod robot;
+mod starter;
 #[cfg(test)]
 mod tests;
 mod topology;
@@ -30,3 +31,4 @@ mod transform;
 mod xml;
 
 pub(super) use expand::{expand, file_of};
+pub use starter::{FingertipRequest, Starter, StarterRequest};

@@ -2,7 +2,7 @@
 
 use super::super::error::{Place, SceneError, suggestion};
 use super::body::Body;
-use super::robot::{Dynamics, Joint, Kind, Limit, Link, Origin, Robot};
+use super::robot::{Dynamics, Joint, Kind, Limit, Link, Origin, Robot, Shape};
 use super::transform::Transform;
 use super::xml::{Text, child, children, quote};
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
@@ -12,6 +12,9 @@ use roxmltree::Node;
 const MOST_PARTS: usize = 2000;
 /// How far an axis may be from a unit vector: files with three decimals are that far off.
 const AXIS_SLACK: f64 = 1e-3;
+
+/// Shorter ones have no direction that was meant.
+const SHORTEST_AXIS: f64 = 1e-4;
 
 /// How far the square of a product of inertia may be above the product of its moments, relatively: rounded digits.
 const PRODUCT_SLACK: f64 = 1e-4;
@@ -40,7 +43,8 @@ impl Robot {
             }
         }
         let reader = Reader { text, quaternions: version(root) >= (1, 1) };
-        let mut robot = Self { place, links: vec![], joints: vec![] };
+        let name = root.attribute("name").unwrap_or_default().into();
+        let mut robot = Self { place, name, links: vec![], joints: vec![] };
         for element in root.children().filter(Node::is_element) {
             reader.text.refuse_xacro(element)?;
             if element.tag_name().name() == "link" {
@@ -136,10 +140,10 @@ impl Reader<'_> {
         let (name, place) = (self.name(element)?, self.text.place(element));
         let of = format!("link `{}`", quote(&name));
         let (body, body_place) = match child(element, "inertial") {
-            Some(inertial) => (self.body(&of, inertial)?, self.text.place(inertial)),
-            None => (Body::none(), place.clone()),
+            Some(inertial) => (self.body(&of, inertial), self.text.place(inertial)),
+            None => (Ok(Body::none()), place.clone()),
         };
-        Ok(Link { name, place, body, body_place })
+        Ok(Link { name, place, body, body_place, shapes: self.shapes(element) })
     }
 
     fn body(&self, of: &str, inertial: Node<'_, '_>) -> Result<Body, SceneError> {
@@ -182,6 +186,28 @@ impl Reader<'_> {
             return Ok(Body { centre_m: origin.transform.offset_m, ..body });
         }
         Ok(body.seen_from(&origin.transform))
+    }
+
+    /// Shapes of a link; what can't be read of them is nobody's loss.
+    fn shapes(&self, link: Node<'_, '_>) -> Vec<Shape> {
+        let shapes = children(link, "collision").chain(children(link, "visual"));
+        let shapes = shapes.filter_map(|shape| {
+            let solid = child(shape, "geometry")?.first_element_child()?;
+            let number = |name| Some(self.text.numbers::<1>("", solid, name).ok()??[0]);
+            let (word, radius_m) = match solid.tag_name().name() {
+                "sphere" => ("sphere", number("radius")?),
+                "capsule" => ("capsule", number("radius")?),
+                "cylinder" => ("cylinder", number("radius")?.min(0.5 * number("length")?)),
+                "box" => {
+                    let sides: [f64; 3] = self.text.numbers("", solid, "size").ok()??;
+                    ("box", 0.5 * sides.into_iter().fold(f64::INFINITY, f64::min))
+                }
+                _ => return None,
+            };
+            let centre_m = self.origin("", shape).ok()?.transform.offset_m;
+            (radius_m > 0.0).then_some(Shape { word, centre_m, radius_m })
+        });
+        shapes.collect()
     }
 
     fn origin(&self, of: &str, parent: Node<'_, '_>) -> Result<Origin, SceneError> {
@@ -293,7 +319,7 @@ impl Reader<'_> {
             return Ok((axis, place)); // Means nothing.
         }
         let length = blindgrasp_shared::math::norm(&axis);
-        if length == 0.0 {
+        if length < SHORTEST_AXIS {
             return self.fail(
                 element,
                 format!("{of}: the axis is zero"),

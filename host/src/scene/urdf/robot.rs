@@ -1,6 +1,6 @@
 //! A URDF as it is written: links, joints, and where each of them stands.
 
-use super::super::error::{Place, suggestion};
+use super::super::error::{Place, SceneError, suggestion};
 use super::body::Body;
 use super::transform::{Transform, roll_pitch_yaw};
 use nalgebra::Vector3;
@@ -9,6 +9,7 @@ use nalgebra::Vector3;
 #[derive(Clone, Debug)]
 pub(super) struct Robot {
     pub(super) place: Place,
+    pub(super) name: String,
     pub(super) links: Vec<Link>,
     pub(super) joints: Vec<Joint>,
 }
@@ -18,10 +19,23 @@ pub(super) struct Robot {
 pub(super) struct Link {
     pub(super) name: String,
     pub(super) place: Place,
-    /// Its own mass, in its frame.
-    pub(super) body: Body,
+    /// Its own mass, in its frame; what is wrong with it matters only if it moves.
+    pub(super) body: Result<Body, SceneError>,
     /// Where that is written.
     pub(super) body_place: Place,
+    /// What it looks like, as far as no mesh is needed to know.
+    pub(super) shapes: Vec<Shape>,
+}
+
+/// A sphere, box, cylinder or capsule of a link.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Shape {
+    /// What it is.
+    pub(super) word: &'static str,
+    /// Its middle in the link's frame, m.
+    pub(super) centre_m: Vector3<f64>,
+    /// Radius of the largest sphere that fits into it, m.
+    pub(super) radius_m: f64,
 }
 
 /// A joint.

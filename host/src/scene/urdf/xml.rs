@@ -65,7 +65,8 @@ impl<'a> Text<'a> {
                 }
                 Error::NoRootNode => ("not XML: there is nothing in it".into(), "is this a URDF?", end()),
                 Error::DtdDetected => {
-                    ("has a DTD".into(), "remove <!DOCTYPE ...>: a URDF needs none", self.whole().clone())
+                    let at = self.text.find("<!DOCTYPE").unwrap_or_default();
+                    ("has a DTD".into(), "remove <!DOCTYPE ...>: a URDF needs none", self.lines.place(at))
                 }
                 Error::NodesLimitReached => {
                     let problem = format!("has more than {MOST_NODES} elements");
@@ -80,7 +81,9 @@ impl<'a> Text<'a> {
                     // Its position is told as a line already.
                     let words = error.to_string().replacen(&format!(" at {position}"), "", 1);
                     let place = self.lines.line(position.row as usize);
-                    (format!("not XML: {}", quote(&words)), "correct it there or before", place)
+                    let is_robot = self.text.contains("<robot");
+                    let remedy = if is_robot { "correct it there or before" } else { "is this a URDF?" };
+                    (format!("not XML: {}", quote(&words)), remedy, place)
                 }
             };
             SceneError::new("", problem, remedy).at(&place)
@@ -134,7 +137,10 @@ impl<'a> Text<'a> {
                     return fail(format!("`{}` is an expression of xacro", quote(text)), EXPAND);
                 }
                 Err(_) if word.contains(',') => {
-                    return fail(format!("`{}` is no number", quote(word)), "separate numbers by blanks");
+                    return fail(
+                        format!("`{}` is no number", quote(word)),
+                        "separate numbers by blanks, and write decimals with a point",
+                    );
                 }
                 Err(_) => return fail(format!("`{}` is no number", quote(word)), "write it as 0.1 or 1e-1"),
             }

@@ -60,7 +60,7 @@ fn damaged_numbers_never_panic_and_no_error_is_missed() {
     let mut random = fastrand::Rng::with_seed(11);
     let (mut usable, mut broken) = (0, 0);
     for round in 0..300 {
-        let mut file = HandFile::load(SHIPPED[round % 2]).unwrap();
+        let mut file = HandFile::load(PAPER_S[round % 2]).unwrap();
         let hits = 1 + round % 5;
         let mut all = numbers(&mut file);
         for _ in 0..hits {
@@ -100,7 +100,7 @@ fn damaged_numbers_never_panic_and_no_error_is_missed() {
 fn damaged_trees_never_panic() {
     let mut random = fastrand::Rng::with_seed(12);
     for round in 0..300 {
-        let mut file = HandFile::load(SHIPPED[round % 2]).unwrap();
+        let mut file = HandFile::load(PAPER_S[round % 2]).unwrap();
         for _ in 0..1 + round % 4 {
             let (a, b) = (random.usize(..file.joints.len()), random.usize(..file.joints.len()));
             match random.usize(..7) {

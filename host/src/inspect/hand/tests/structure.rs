@@ -84,7 +84,7 @@ fn too_few_and_too_many() {
                 number(&text, "mass_kg = -1")
             ),
             format!(
-                "error: hand.toml:{}: the hand has 1 fingertips: grasping needs at least two; add a [[fingertip]]",
+                "error: hand.toml:{}: the hand has 1 fingertip: grasping needs at least two; add a [[fingertip]]",
                 number(&text, "[[fingertip]]")
             ),
         ]

@@ -97,7 +97,7 @@ fn hostile_urdfs_take_no_time() {
             "has a DTD; remove <!DOCTYPE ...>: a URDF needs none",
         ),
         ("blanks", repeated(&|_| "                                        ".into()) + "</robot>", "has no <link>; is this a URDF?"),
-        ("a long number", repeated(&|k| if k == 0 { "<link name=\"a\"><inertial><origin xyz=\"".into() } else { "9999999999".into() }) + " 0 0\"/></inertial></link></robot>", "is not finite"),
+        ("a long number", repeated(&|k| if k == 0 { "<link name=\"a\"/><link name=\"b\"/><joint name=\"j\" type=\"fixed\"><parent link=\"a\"/><child link=\"b\"/><origin xyz=\"".into() } else { "9999999999".into() }) + " 0 0\"/></joint></robot>", "is not finite"),
     ];
     for (what, urdf, expected) in cases {
         assert!(urdf.len() <= 4 << 20, "{what}: {}", urdf.len());

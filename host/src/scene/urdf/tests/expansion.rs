@@ -133,6 +133,10 @@ fn what_is_odd_is_a_notice() {
             "gripper.urdf:31: joint `left-base`: its friction of 10.0 N m is more than its motor can turn against; if it is a placeholder, add `ignore = [\"friction\", \"damping\"]` to [urdf]",
         ),
         (
+            changed(GRIPPER, "damping=\"1e-4\"", "damping=\"3\""),
+            "gripper.urdf:31: joint `left-base`: its damping of 3.0 N m s/rad leaves its motor nothing at 10.0 rad/s; if it is a placeholder, add `ignore = [\"friction\", \"damping\"]` to [urdf]",
+        ),
+        (
             changed(
                 GRIPPER,
                 "</robot>",
@@ -157,6 +161,18 @@ fn what_is_odd_is_a_notice() {
     let (file, _, warnings) = load(&quiet, &urdf).unwrap();
     assert_eq!(warnings, Vec::<String>::new());
     assert_eq!((file.joints[0].torque_limit_nm, file.joints[0].coulomb_friction_nm), (0.3, 0.0));
+}
+
+/// What is wrong with the mass of a link matters only where it moves.
+#[test]
+fn masses_that_do_not_move_may_be_wrong() {
+    let urdf = changed(GRIPPER, "<mass value=\"0.5\"/>", "<mass value=\"nan\"/>");
+    assert_eq!(load(HAND, &urdf).unwrap().0, load(HAND, GRIPPER).unwrap().0);
+    let urdf = changed(GRIPPER, "<mass value=\"0.01\"/>", "<mass value=\"nan\"/>");
+    assert_eq!(
+        load(HAND, &urdf).map(|(file, ..)| file.name).unwrap_err(),
+        "gripper.urdf:49: link `left-tip`: value of <mass>: `nan` is not finite; has to be a finite number"
+    );
 }
 
 /// Zero would not be a nominal angle.

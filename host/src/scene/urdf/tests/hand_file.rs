@@ -213,6 +213,6 @@ fn too_many_joints_are_told_with_the_remedy() {
     urdf += "<link name=\"right-tip\"/><joint name=\"r\" type=\"fixed\"><parent link=\"l3\"/><child link=\"right-tip\"/></joint></robot>";
     assert_eq!(
         message(HAND, &urdf),
-        "hand.toml:3: 25 joints of the URDF move a fingertip: at most 24 are supported; hold some still with `locked_rad`, or use fewer fingertips"
+        "gripper.urdf:1: 25 joints move a fingertip: at most 24 are supported; choose a `base` closer to the hand, hold joints still, or name fewer fingertips"
     );
 }

@@ -4,6 +4,7 @@ mod damage;
 mod expansion;
 mod hand_file;
 mod refusals;
+mod starter;
 
 use super::super::file::HandFile;
 use super::super::hand_model::HandModel;

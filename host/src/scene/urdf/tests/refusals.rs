@@ -67,7 +67,7 @@ fn errors_in_the_urdf_say_where_what_and_what_to_do() {
         (
             "0 0.04 0",
             "0,0.04,0",
-            "gripper.urdf:28: joint `left-base`: xyz of <origin>: `0,0.04,0` is no number; separate numbers by blanks",
+            "gripper.urdf:28: joint `left-base`: xyz of <origin>: `0,0.04,0` is no number; separate numbers by blanks, and write decimals with a point",
         ),
         (
             "0 0.04 0",
@@ -353,7 +353,7 @@ fn files_that_are_no_text_are_told() {
         |urdf: &[u8]| load_bytes(HAND, urdf).map(|(file, _, _)| file.name).expect_err("has to be refused");
     let cases: [(&[u8], &str); 10] = [
         (b"", "gripper.urdf:1: not XML: there is nothing in it; is this a URDF?"),
-        (b"hello", "gripper.urdf:1: not XML: unknown token; correct it there or before"),
+        (b"hello", "gripper.urdf:1: not XML: unknown token; is this a URDF?"),
         (b"\n\n<robot>\xff</robot>", "gripper.urdf:3: not UTF-8 text; save it as UTF-8"),
         (b"\xff\xfe<\0r\0o\0b\0o\0t\0", "gripper.urdf:1: not UTF-8 text; save it as UTF-8"),
         (b"<robot/>", "gripper.urdf:1: has no <link>; is this a URDF?"),
@@ -366,7 +366,7 @@ fn files_that_are_no_text_are_told() {
         (&[b' '; 5 << 20], "hand.toml:4: urdf.file: `gripper.urdf`: 5 MiB are too many; check the path"),
         (
             b"<!DOCTYPE robot SYSTEM \"a.dtd\"><robot/>",
-            "gripper.urdf: has a DTD; remove <!DOCTYPE ...>: a URDF needs none",
+            "gripper.urdf:1: has a DTD; remove <!DOCTYPE ...>: a URDF needs none",
         ),
     ];
     for (urdf, expected) in cases {

@@ -1,0 +1,49 @@
+//! Triangles as a file has them: each for itself.
+
+use nalgebra::Vector3;
+
+/// What is wrong with a file, and what to do.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) struct Problem {
+    pub(super) what: String,
+    pub(super) remedy: String,
+}
+
+impl Problem {
+    pub(super) fn new(what: impl Into<String>, remedy: impl Into<String>) -> Self {
+        Self { what: what.into(), remedy: remedy.into() }
+    }
+}
+
+/// Triangles in the unit of the file, and the number of each in the file, from 0.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(super) struct Soup {
+    pub(super) triangles: Vec<[Vector3<f64>; 3]>,
+    pub(super) numbers: Vec<u32>,
+}
+
+impl Soup {
+    pub(super) fn with_capacity(count: usize) -> Self {
+        Self { triangles: Vec::with_capacity(count), numbers: Vec::with_capacity(count) }
+    }
+
+    pub(super) fn push(&mut self, corners: [Vector3<f64>; 3], number: usize) {
+        self.triangles.push(corners);
+        self.numbers.push(number as u32);
+    }
+
+    /// Every length multiplied.
+    pub(super) fn scale(&mut self, by: impl Fn(f64) -> f64) {
+        for corner in self.triangles.iter_mut().flatten() {
+            *corner = corner.map(&by);
+        }
+    }
+
+    /// Extents along x, y and z.
+    pub(super) fn size(&self) -> Vector3<f64> {
+        let Some(start) = self.triangles.first().map(|corners| corners[0]) else { return Vector3::zeros() };
+        let all = self.triangles.iter().flatten();
+        let (low, high) = all.fold((start, start), |(low, high), p| (low.inf(p), high.sup(p)));
+        high - low
+    }
+}

@@ -1,0 +1,107 @@
+//! A hand's file to start from, for a URDF: what the URDF says stays there, and what it can't say is guessed, marked, and told
+//! how. Every guess scales with the hand.
+
+mod fingertips;
+mod gains;
+mod text;
+
+use super::super::check::Result;
+use super::super::error::{Place, SceneError};
+use super::super::file::HandFile;
+use super::super::hand_model::HandModel;
+use super::super::library::{Document, read_text};
+use super::keys::Keys;
+use super::robot::{Kind, Robot};
+use super::topology::Tree;
+use gains::Gains;
+use std::path::PathBuf;
+
+/// What a hand's file is started from.
+#[derive(Clone, Debug, Default)]
+pub struct StarterRequest {
+    /// The URDF as the hand's file is to name it: relative to [`folder`](Self::folder), or absolute.
+    pub file: String,
+    /// The folder that the hand's file is to be in.
+    pub folder: PathBuf,
+    /// The link that is the base frame; the root without it.
+    pub base: Option<String>,
+    /// Joints to hold still, and their angles, rad; for prismatic joints m.
+    pub locked: Vec<(String, f64)>,
+    /// The fingertips; guessed, if there is none.
+    pub fingertips: Vec<FingertipRequest>,
+}
+
+/// A fingertip; what is left out is guessed.
+#[derive(Clone, Debug, PartialEq)]
+pub struct FingertipRequest {
+    /// A link of the URDF.
+    pub link: String,
+    /// Its centre in the frame of the link, m.
+    pub offset_m: Option<[f64; 3]>,
+    /// Its radius, m.
+    pub radius_m: Option<f64>,
+}
+
+/// A hand's file to start from.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Starter {
+    /// The file.
+    pub text: String,
+    /// What in it is guessed, and how.
+    pub guesses: Vec<String>,
+    /// What is odd in the URDF or the hand, in words.
+    pub warnings: Vec<String>,
+}
+
+impl StarterRequest {
+    /// Reads the URDF, guesses what it can't say, and makes sure that the file can be used.
+    ///
+    /// # Errors
+    /// One line: where, what is wrong, what to do.
+    pub fn start(&self) -> std::result::Result<Starter, SceneError> {
+        let path = self.folder.join(&self.file);
+        let text = read_text(&path, ".urdf")?;
+        let robot = Robot::parse(&text, &path.to_string_lossy())?;
+        let tree = Tree::of(&robot)?;
+        let keys = self.keys(&robot);
+        let draft = fingertips::choose(&robot, &tree, &keys, &self.fingertips)
+            .and_then(|fingertips| text::Draft::new(&robot, &tree, keys, fingertips))
+            .map_err(on_command_line)?;
+        // Kinematics and masses as any command will see them; gains do not matter to them.
+        let (model, file) = self.hand(&draft.write(&Gains::preliminary(&draft)))?;
+        let gains = Gains::new(&draft, &file, &model.hand)?;
+        let text = draft.write(&gains);
+        let (HandModel { warnings, .. }, _) = self.hand(&text)?;
+        Ok(Starter { text, guesses: draft.guesses(&gains), warnings })
+    }
+
+    /// The table `[urdf]`.
+    fn keys(&self, robot: &Robot) -> Keys {
+        let mut keys = Keys { file: self.file.clone(), base: self.base.clone(), ..Keys::default() };
+        for (name, position) in &self.locked {
+            let is_prismatic =
+                robot.joint_index(name).is_some_and(|k| robot.joints[k].kind == Kind::Prismatic);
+            let list = if is_prismatic { &mut keys.locked_m } else { &mut keys.locked_rad };
+            list.insert(name.clone(), *position);
+        }
+        keys
+    }
+
+    /// The hand of a file that is not written yet.
+    fn hand(&self, text: &str) -> Result<(HandModel, HandFile)> {
+        HandModel::from_document(Document::parse(text, "the new hand's file", &self.folder)?)
+    }
+}
+
+/// Errors about keys of `[urdf]` come from options of the command.
+fn on_command_line(mut error: SceneError) -> SceneError {
+    for (key, option) in
+        [("urdf.base", "--base"), ("urdf.locked_rad.", "--lock"), ("urdf.locked_m.", "--lock")]
+    {
+        if let Some(name) = error.key.strip_prefix(key) {
+            error.key = name.into();
+            return error.at(&Place::whole(option));
+        }
+    }
+    error
+}
