@@ -167,6 +167,12 @@ fn study(count: usize, mesh_count: usize) -> Vec<(Specimen, Outcome)> {
         specimens.into_iter().zip(outcomes).collect::<Vec<_>>()
     };
     let (hulls, meshes) = (run(hulls), run(meshes));
+    for (s, o) in &meshes {
+        eprintln!(s.faces, s.extent_m, o.placed.as_ref().map(|p| p.quality.chance));
+    }
+    for (s, o) in &hulls {
+        if let Err(e) = &o.placed {}
+    }
     println!(
         "objects of styrene foam, rotated anywhere, in the paper's hand and model for 5 s (gains of Table VII):"
     );

@@ -72,31 +72,31 @@ impl Facet {
     }
 }
 
-/// The half-planes of a convex part of an outline around the origin, from its edges, with the inside on their left. Those of
-/// a convex outline are its edges. Of another, each edge has the half-plane that ends at its point nearest to the origin,
-/// across the way there: no edge reaches into it.
+/// The origin has to be so much of its distance from the nearest edge inside of the lines along all edges, so that these make
+/// the convex part.
+const KEPT: f64 = 0.8;
+
+/// The half-planes of a convex part of an outline around the origin, from its edges, with the inside on their left: what lies
+/// on the inner side of the lines along all edges, which is all of a convex outline, and nearly all of one that is convex but
+/// for the noise of a mesh. Where that leaves out the origin or comes close to it, each edge has the half-plane that ends at its
+/// point nearest to the origin, across the way there: no edge reaches into it.
 fn cell(edges: &[(Vector2<f64>, Vector2<f64>)]) -> Vec<HalfPlane> {
-    let beside = |(from, to): &(Vector2<f64>, Vector2<f64>)| {
-        let way = (to - from).normalize();
+    let along = |(from, to): &(Vector2<f64>, Vector2<f64>)| {
+        let way = (to - from).try_normalize(0.0)?;
         let inwards = Vector2::new(-way.y, way.x);
-        HalfPlane { inwards, offset_m: -inwards.dot(from) }
+        Some(HalfPlane { inwards, offset_m: -inwards.dot(from) })
     };
-    let lines: Vec<HalfPlane> = edges.iter().map(beside).collect();
-    let extent = edges.iter().map(|(from, _)| from.amax()).fold(0.0, f64::max);
-    let is_convex = lines.iter().all(|line| {
-        edges.iter().all(|(corner, _)| line.inwards.dot(corner) + line.offset_m >= -1e-9 * extent)
-    });
-    if is_convex {
-        return lines;
-    }
-    let nearest = edges.iter().filter_map(|(from, to)| {
-        let along = to - from;
-        let share = (-from.dot(&along) / along.norm_squared()).limited(0.0, 1.0);
-        let point = from + along * share;
+    let across = |(from, to): &(Vector2<f64>, Vector2<f64>)| {
+        let way = to - from;
+        let share = (-from.dot(&way) / way.norm_squared()).limited(0.0, 1.0);
+        let point = from + way * share;
         let offset_m = point.norm();
         (offset_m > 0.0).then(|| HalfPlane { inwards: -point / offset_m, offset_m })
-    });
-    nearest.collect()
+    };
+    let least = |cell: &[HalfPlane]| cell.iter().map(|half| half.offset_m).fold(f64::INFINITY, f64::min);
+    let lines: Vec<HalfPlane> = edges.iter().filter_map(along).collect();
+    let points: Vec<HalfPlane> = edges.iter().filter_map(across).collect();
+    if least(&lines) >= KEPT * least(&points) { lines } else { points }
 }
 
 #[cfg(test)]
