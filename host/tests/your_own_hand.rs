@@ -22,10 +22,15 @@ fn the_page_leads_from_urdf_and_stl_to_a_grasp_that_holds() {
     // The first command builds, which is done.
     assert!(commands[0].starts_with("cargo build --release"), "{}", commands[0]);
     let path = format!("{}:{}", program.parent().unwrap().display(), std::env::var("PATH").unwrap());
-    std::os::unix::fs::symlink(root.canonicalize().unwrap().join("models"), folder.path().join("models")).unwrap();
+    std::os::unix::fs::symlink(root.canonicalize().unwrap().join("models"), folder.path().join("models"))
+        .unwrap();
     for command in &commands[1..] {
-        let output =
-            Command::new("sh").args(["-c", command]).env("PATH", &path).current_dir(&folder).output().unwrap();
+        let output = Command::new("sh")
+            .args(["-c", command])
+            .env("PATH", &path)
+            .current_dir(&folder)
+            .output()
+            .unwrap();
         let (out, err) = (String::from_utf8_lossy(&output.stdout), String::from_utf8_lossy(&output.stderr));
         println!("$ {command}\n{out}{err}");
         assert!(output.status.success(), "{command}: {err}");
