@@ -1,4 +1,5 @@
-//! Many objects, placed in the paper's hand and grasped in the paper's own model, with `u_st` and without.
+//! Many objects, placed in the paper's hand and grasped in the paper's own model, with `u_st` and without, and once more with
+//! the encoders, the delay, the limits and the friction of the hand.
 
 use blindgrasp::placement::{NoPlacement, Placement, Reach, Request, place};
 use blindgrasp::scene::file::{ObjectFile, SceneFile, ShapeFile};
@@ -32,13 +33,26 @@ pub struct Outcome {
     pub placed: Result<Box<Placement>, String>,
     /// How long the search took, s.
     pub search_s: f64,
-    /// The run with `u_st`, and the one without.
-    pub runs: Option<(Summary, Summary)>,
+    /// What the grasp came to.
+    pub runs: Option<Runs>,
+}
+
+/// What a grasp came to.
+#[derive(Clone, Debug)]
+pub struct Runs {
+    /// In the paper's model.
+    pub with: Summary,
+    /// In the paper's model, without `u_st`.
+    pub without: Summary,
+    /// With encoders, delay, limits and friction; none if the posture for the first touch can't be taken.
+    pub real: Option<Summary>,
 }
 
 /// The hand of the study, with all that does not depend on the object.
 pub struct Study {
     like: SceneFile,
+    /// The same hand with encoders, delay, limits and friction.
+    real: SceneFile,
     reach: Reach,
 }
 
@@ -49,7 +63,8 @@ impl Default for Study {
         like.contacts.clear();
         let parts = Parts::of(&like).expect("a built-in scene");
         let reach = Reach::of_scene(&like, &parts).expect("a built-in scene");
-        Self { like, reach }
+        let real = Scene::load("cube", &[DURATION.to_owned()]).expect("built in").file;
+        Self { like, real, reach }
     }
 }
 
@@ -92,9 +107,20 @@ impl Study {
         let search_s = begun.elapsed().as_secs_f64();
         let placed = placed.map(|mut all| Box::new(all.swap_remove(0))).map_err(|none| none.to_string());
         let runs = placed.as_ref().ok().map(|placement| {
-            let mut file = placement.scene.file.clone();
-            file.control.attitude_stiffness_nm = 0.0;
-            (simulate(&placement.scene), simulate(&Scene::build(file).expect("the same scene")))
+            let file = &placement.scene.file;
+            let mut without = file.clone();
+            without.control.attitude_stiffness_nm = 0.0;
+            let real = SceneFile {
+                object: file.object.clone(),
+                pose: file.pose.clone(),
+                contacts: file.contacts.clone(),
+                ..self.real.clone()
+            };
+            Runs {
+                with: simulate(&placement.scene),
+                without: simulate(&Scene::build(without).expect("the same scene")),
+                real: Scene::build(real).ok().map(|scene| simulate(&scene)),
+            }
         });
         Outcome { placed, search_s, runs }
     }

@@ -4,7 +4,7 @@
 use blindgrasp::scene::ObjectFile;
 use blindgrasp_tests::polyhedra::{EXTENT_M, FACES, RandomPolyhedron, noisy_stl, polyhedron};
 use blindgrasp_tests::random::Draw;
-use blindgrasp_tests::study::{DENSITY_KG_M3, Outcome, Specimen, Study, simulate, spread};
+use blindgrasp_tests::study::{DENSITY_KG_M3, Outcome, Runs, Specimen, Study, simulate, spread};
 use std::fmt::Write as _;
 use std::fs;
 use std::path::PathBuf;
@@ -62,31 +62,28 @@ fn meshes(draw: &mut Draw, bodies: &[RandomPolyhedron]) -> Vec<Specimen> {
 
 /// One line of the table.
 fn line(text: &mut String, name: &str, outcomes: &[(&Specimen, &Outcome)]) {
-    let all = outcomes.len();
-    let share = |of: usize| 100.0 * of as f64 / all.max(1) as f64;
-    let count =
-        |test: &dyn Fn(&Outcome) -> bool| outcomes.iter().filter(|(_, outcome)| test(outcome)).count();
-    let held = |outcome: &Outcome| outcome.runs.as_ref().is_some_and(|(with, _)| with.grasp_held);
-    let held_without =
-        |outcome: &Outcome| outcome.runs.as_ref().is_some_and(|(_, without)| without.grasp_held);
-    let mut settled: Vec<f64> = outcomes
-        .iter()
-        .filter_map(|(_, outcome)| outcome.runs.as_ref().and_then(|(with, _)| with.settle_time_s))
-        .collect();
+    let all = outcomes.len().max(1) as f64;
+    let runs: Vec<&Runs> = outcomes.iter().filter_map(|(_, outcome)| outcome.runs.as_ref()).collect();
+    let share =
+        |test: &dyn Fn(&Runs) -> bool| 100.0 * runs.iter().filter(|runs| test(runs)).count() as f64 / all;
+    let placements = outcomes.iter().filter_map(|(_, outcome)| outcome.placed.as_ref().ok());
+    let real = |runs: &Runs| runs.real.as_ref().is_some_and(|real| real.grasp_held);
+    let mut settled: Vec<f64> =
+        runs.iter().filter_map(|runs| runs.real.as_ref().and_then(|real| real.settle_time_s)).collect();
     settled.sort_by(f64::total_cmp);
     let median = settled.get(settled.len() / 2).map_or("-".to_owned(), |t| format!("{t:.2}"));
-    let placed = count(&|outcome| outcome.placed.is_ok());
-    let chances =
-        outcomes.iter().filter_map(|(_, outcome)| outcome.placed.as_ref().ok()).map(|p| p.quality.chance);
     let _ = writeln!(
         text,
-        "{name:<22}{all:>6}{:>9.1}{:>9.1}{:>9.1}{:>9.1}{:>10.1}{:>10.1}{median:>9}",
-        share(placed),
-        100.0 * chances.sum::<f64>() / all.max(1) as f64,
-        share(count(&held)),
-        share(count(&held_without)),
-        share(count(&|outcome| held_without(outcome) && !held(outcome))),
-        share(settled.len()),
+        "{name:<20}{:>6}{:>8.1}{:>10.1}{:>7.1}{:>9.1}{:>10.1}{:>9.1}  {:>7.1}{:>9.1}{median:>8}",
+        outcomes.len(),
+        100.0 * runs.len() as f64 / all,
+        100.0 * placements.map(|placement| placement.quality.chance).sum::<f64>() / all,
+        share(&|runs| runs.with.grasp_held),
+        share(&|runs| runs.without.grasp_held),
+        share(&|runs| runs.without.grasp_held && !runs.with.grasp_held),
+        share(&|runs| runs.with.settled),
+        share(&real),
+        100.0 * settled.len() as f64 / all,
     );
 }
 
@@ -94,8 +91,18 @@ fn line(text: &mut String, name: &str, outcomes: &[(&Specimen, &Outcome)]) {
 fn table(hulls: &[(Specimen, Outcome)], meshes: &[(Specimen, Outcome)]) -> String {
     let all: Vec<(&Specimen, &Outcome)> = hulls.iter().map(|(s, o)| (s, o)).collect();
     let mut text = format!(
-        "{:<22}{:>6}{:>9}{:>9}{:>9}{:>9}{:>10}{:>10}{:>9}\n",
-        "share in %", "count", "placed", "expected", "held", "without", "only w/o", "at rest", "at s"
+        "{:<20}{:>6}{:>8}{:>10}{:>7}{:>9}{:>10}{:>9}  {:>7}{:>9}{:>8}\n",
+        "share in %",
+        "count",
+        "placed",
+        "expected",
+        "held",
+        "without",
+        "only w/o",
+        "at rest",
+        "real",
+        "at rest",
+        "from s"
     );
     line(&mut text, "convex polyhedra", &all);
     for (low, high) in [(4, 6), (7, 10), (11, 15), (16, 20), (21, 30)] {
@@ -125,15 +132,11 @@ fn table(hulls: &[(Specimen, Outcome)], meshes: &[(Specimen, Outcome)]) -> Strin
                     first.split(|c: char| c.is_ascii_digit() || "`:,;".contains(c)).next().unwrap_or(first);
                 reason(format!("not placed: {}", words.trim()));
             }
-            (Ok(_), Some((with, _))) => {
-                if let Some(why) = &with.lost_reason {
-                    reason(format!(
-                        "lost: {}",
-                        why.trim_start_matches(|c: char| !c.is_whitespace())
-                            .trim_start()
-                            .trim_start_matches(|c: char| c.is_ascii_digit())
-                            .trim_start()
-                    ));
+            (Ok(_), Some(runs)) => {
+                if let Some(why) = &runs.with.lost_reason {
+                    let what =
+                        why.split_once(|c: char| c.is_ascii_digit()).map_or(why.as_str(), |(_, what)| what);
+                    reason(format!("lost: a finger {}", what.trim()));
                 }
             }
             (Ok(_), None) => {}
@@ -167,14 +170,9 @@ fn study(count: usize, mesh_count: usize) -> Vec<(Specimen, Outcome)> {
         specimens.into_iter().zip(outcomes).collect::<Vec<_>>()
     };
     let (hulls, meshes) = (run(hulls), run(meshes));
-    for (s, o) in &meshes {
-        eprintln!(s.faces, s.extent_m, o.placed.as_ref().map(|p| p.quality.chance));
-    }
-    for (s, o) in &hulls {
-        if let Err(e) = &o.placed {}
-    }
     println!(
-        "objects of styrene foam, rotated anywhere, in the paper's hand and model for 5 s (gains of Table VII):"
+        "objects of styrene foam, rotated anywhere, in the paper's hand for 5 s (gains of Table VII): in the paper's model, \
+         and (`real`) with encoders, delay, limits and joint friction"
     );
     println!("{}", table(&hulls, &meshes));
     assert_eq!((hulls.len(), meshes.len()), (count, mesh_count));
@@ -184,9 +182,10 @@ fn study(count: usize, mesh_count: usize) -> Vec<(Specimen, Outcome)> {
 /// Nothing panics, nothing is not a number; and what the paper claims, in its weakest form: `u_st` is there to hold what the
 /// normal forces alone do not.
 fn check(outcomes: &[(Specimen, Outcome)]) {
-    let held = |which: fn(&Outcome) -> bool| outcomes.iter().filter(|(_, outcome)| which(outcome)).count();
-    let with = held(|outcome| outcome.runs.as_ref().is_some_and(|(with, _)| with.grasp_held));
-    let without = held(|outcome| outcome.runs.as_ref().is_some_and(|(_, without)| without.grasp_held));
+    let held = |which: fn(&Runs) -> bool| {
+        outcomes.iter().filter(|(_, outcome)| outcome.runs.as_ref().is_some_and(which)).count()
+    };
+    let (with, without) = (held(|runs| runs.with.grasp_held), held(|runs| runs.without.grasp_held));
     assert!(with > without, "{with} with u_st, {without} without");
 }
 

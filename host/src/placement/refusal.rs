@@ -86,6 +86,8 @@ pub(super) struct Count {
     pub(super) back: Tally<Miss>,
     /// At which a bone passes through the object.
     pub(super) through: Tally<Miss>,
+    /// That the checks of a scene refuse, and why.
+    pub(super) refused: Tally<String>,
 }
 
 impl Count {
@@ -135,12 +137,20 @@ impl Count {
         for (tally, what) in misses {
             test(tally.failed, what, nearest(tally, |_, miss| words.miss(miss)));
         }
+        test(
+            self.refused.failed,
+            "taken, but the scene is refused",
+            nearest(&self.refused, |_, why| why.clone()),
+        );
         Refusal { reason: self.reason(words), tests }
     }
 
     /// What it comes down to: the last test that anything came to.
     fn reason(&self, words: &Words<'_>) -> String {
         let fingertips = words.hand.fingertips.len();
+        if let Some((_, why)) = &self.refused.nearest {
+            return format!("the fingers get there, but the scene is refused: {why}");
+        }
         let tried = [&self.unreachable, &self.at_stop, &self.overlap, &self.back, &self.through];
         if tried.iter().any(|tally| tally.failed > 0) {
             let worst = tried.into_iter().max_by_key(|tally| tally.failed);

@@ -9,7 +9,7 @@ use super::stance::{self, Miss, Stance};
 use super::task::Task;
 use super::{NARROWEST, NoPlacement, Placement, Refusal, Request};
 use crate::scene::file::{ContactFile, Indentation, PoseFile, SceneFile};
-use crate::scene::{Scene, equilibrium_indentations};
+use crate::scene::{Scene, SceneError, equilibrium_indentations};
 use nalgebra::{UnitQuaternion, Vector3};
 
 /// Positions that are tried for an arrangement.
@@ -42,8 +42,16 @@ pub(super) fn run(request: &Request<'_>, most: usize) -> Result<Vec<Placement>, 
             drafts.insert(at, draft);
         }
     }
-    let placements: Vec<Placement> =
-        drafts.into_iter().filter_map(|draft| placement(&task, draft)).take(most).collect();
+    let mut placements = Vec::new();
+    for draft in drafts {
+        match placement(&task, draft) {
+            Ok(placement) => placements.push(placement),
+            Err(error) => count.refused.add(0.0, error.to_string()),
+        }
+        if placements.len() == most {
+            break;
+        }
+    }
     if placements.is_empty() { Err(NoPlacement::None(refusal(&task, &count))) } else { Ok(placements) }
 }
 
@@ -190,7 +198,7 @@ fn take(task: &Task<'_>, stance: &Stance) -> Result<f64, Miss> {
 }
 
 /// The scene of a draft, in numbers that can be read, if its checks agree.
-fn placement(task: &Task<'_>, mut draft: Draft) -> Option<Placement> {
+fn placement(task: &Task<'_>, mut draft: Draft) -> Result<Placement, SceneError> {
     if task.request.any_position {
         for round_m in ROUND_M {
             let position_m = draft.stance.position_m.map(|v| rounded(v, round_m));
@@ -216,9 +224,11 @@ fn placement(task: &Task<'_>, mut draft: Draft) -> Option<Placement> {
         PoseFile { position_m, ..task.request.like.pose.clone() }
     };
     let file = SceneFile { pose, contacts: contacts.collect(), ..task.request.like.clone() };
-    let scene = Scene::build(file).ok()?;
-    let quality = Quality::of(&scene)?;
-    Some(Placement { scene, quality })
+    let scene = Scene::build(file)?;
+    let quality = Quality::of(&scene).ok_or_else(|| {
+        SceneError::new("contact", "the grasping force would pull a fingertip away from its face", "")
+    })?;
+    Ok(Placement { scene, quality })
 }
 
 /// No quaternion for no rotation.
