@@ -14,6 +14,8 @@ mod search;
 mod stance;
 mod task;
 mod template;
+#[cfg(test)]
+mod tests;
 mod text;
 
 use crate::scene::{Parts, Scene, SceneError, SceneFile};
