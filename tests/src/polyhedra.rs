@@ -31,7 +31,7 @@ pub struct RandomPolyhedron {
 pub fn polyhedron(draw: &mut Draw, faces: usize) -> RandomPolyhedron {
     loop {
         let axes = Vector3::from_fn(|_, _| draw.within(FLATTEST, 1.0));
-        let corners = if faces % 2 == 0 && draw.chance(0.5) {
+        let corners = if faces.is_multiple_of(2) && draw.chance(0.5) {
             // Euler's formula: a polyhedron of triangles with V corners has 2 V - 4 faces.
             (0..faces / 2 + 2).map(|_| draw.unit().component_mul(&axes)).collect()
         } else {
