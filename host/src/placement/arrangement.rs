@@ -22,7 +22,7 @@ pub(super) struct Arrangement {
 /// Two fingertips that never get as far apart as their contacts are.
 pub(super) struct TooWide {
     pub(super) fingertips: (usize, usize),
-    /// Distance of the contacts' fingertip centres, m.
+    /// Distance of the contacts, m, if they lie opposite each other.
     pub(super) distance_m: f64,
     /// By how much it is too large, m.
     pub(super) by_m: f64,
@@ -84,8 +84,9 @@ fn too_wide(task: &Task<'_>, centres_m: &[Vector3<f64>]) -> Option<TooWide> {
     let mut worst: Option<TooWide> = None;
     for i in 0..task.count {
         for j in 0..i {
-            let distance_m = (centres_m[i] - centres_m[j]).norm();
-            let by_m = distance_m - task.request.reach.farthest_m[i][j];
+            let between_m = (centres_m[i] - centres_m[j]).norm();
+            let by_m = between_m - task.request.reach.farthest_m[i][j];
+            let distance_m = between_m - task.rolling_radii_m[i] - task.rolling_radii_m[j];
             if by_m > 0.0 && worst.as_ref().is_none_or(|known| by_m > known.by_m) {
                 worst = Some(TooWide { fingertips: (j, i), distance_m, by_m });
             }

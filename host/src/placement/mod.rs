@@ -1,4 +1,25 @@
-//! scratch
+//! Placement: for a hand and an object, which faces the fingertips touch, where on them, how the object lies, and the posture
+//! that holds it there; or why there is none.
+//!
+//! ```text
+//! faces --> combinations --> contact points --> arrangements --> positions --> posture --> scene
+//! facet     combination      points, rolling    arrangement      reach,        stance      search
+//!                            candidate                           position
+//! ```
+//!
+//! 1. Every choice of **faces** is rated with contacts in their middles (fingertips may share a face); of objects with very
+//!    many faces, only the widest are chosen from.
+//! 2. For the best of them, **contact points** are chosen, for the best chance to hold under the law's own equilibrium
+//!    ([`Quality`] says how it is reckoned). The hand does not come into it yet, but for its radii and gains.
+//! 3. Beginning with the best, fingertips and contacts are **arranged**, in the given attitude or in a spread of them, a
+//!    **position** of the object is looked up in a map of where the fingertips get to ([`Reach`]), and the inverse kinematics
+//!    of scenes takes the **posture**. Fingertips may not overlap, touch with their backs, or meet another part of the object;
+//!    bones may not pass through it. Joints that move several fingertips (a trunk) stay where they are.
+//! 4. The best are built as **scenes**, whose own checks have the last word.
+//!
+//! What fails is counted, test by test, with the nearest miss: a [`Refusal`]. Nothing is random; no grasp is simulated. The
+//! search is thorough but not complete: the map has holes, and the contact points of a choice do not give way to the hand.
+
 mod arrangement;
 mod attitude;
 mod candidate;
@@ -14,6 +35,8 @@ mod search;
 mod stance;
 mod task;
 mod template;
+#[cfg(test)]
+mod tests;
 mod text;
 
 use crate::scene::{Parts, Scene, SceneError, SceneFile};

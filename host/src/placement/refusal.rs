@@ -172,7 +172,7 @@ impl Count {
                 a.name,
                 b.name,
                 (words.farthest_m(*i, *j) - radii) * 1e3,
-                (across - radii) * 1e3
+                across * 1e3
             );
         }
         if let Some((by, ())) = &self.close.nearest {
@@ -248,5 +248,57 @@ impl Words<'_> {
                 format!("the bone to fingertip `{}` would pass through the object", fingertip(i))
             }
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::inverse_kinematics::Unreachable;
+    use crate::scene::{Parts, Scene};
+
+    /// Every way in which a posture can't be taken has words.
+    #[test]
+    fn every_miss_has_words() {
+        let scene = Scene::load("cube", &[]).unwrap();
+        let parts = Parts::of(&scene.file).unwrap();
+        let reach = super::super::Reach::of_scene(&scene.file, &parts).unwrap();
+        let words = Words { hand: &scene.file.hand, reach: &reach, any_attitude: false, any_position: true };
+        let unreachable = |limited_by| Unreachable { fingertip: 1, distance_m: 0.0123, limited_by };
+        for (miss, text) in [
+            (Miss::Unreachable(unreachable(None)), "fingertip `finger-2` stays 12.3 mm away"),
+            (
+                Miss::Unreachable(unreachable(Some(4))),
+                "fingertip `finger-2` stays 12.3 mm away, with joint `finger-2-abduct` at its limit",
+            ),
+            (Miss::AtStop(0), "joint `finger-1-abduct` would stand at its end stop"),
+            (Miss::Overlap(0, 2, 0.0014), "fingertips `finger-1` and `finger-3` would overlap by 1.4 mm"),
+            (
+                Miss::Beside(1, 0.002),
+                "fingertip `finger-2` would be 2.0 mm inside another part of the object",
+            ),
+            (Miss::Back(2, -0.3), "fingertip `finger-3` would touch with its back"),
+            (Miss::Through(3), "the bone to joint `finger-1-flex-3` would pass through the object"),
+            (Miss::TipThrough(0), "the bone to fingertip `finger-1` would pass through the object"),
+        ] {
+            let mut count = Count::default();
+            count.miss(miss);
+            let refusal = count.refusal(&words);
+            assert_eq!(refusal.reason, format!("the fingers come near, but {text}"));
+            assert_eq!((refusal.tests.len(), refusal.tests[0].failed), (1, 1));
+            assert_eq!(refusal.tests[0].nearest, text);
+        }
+        let count = Count { apart: 3, ..Count::default() };
+        assert_eq!(
+            count.refusal(&words).to_string(),
+            "there is no position at which, in this attitude, all 3 fingertips get to contacts of theirs at once\n        3 x  no \
+             position at which every fingertip gets to its contact"
+        );
+        let mut count = Count::default();
+        count.refused.add(0.0, "contact.1: is odd".to_owned());
+        assert_eq!(
+            count.refusal(&words).reason,
+            "the fingers get there, but the scene is refused: contact.1: is odd"
+        );
     }
 }

@@ -42,7 +42,7 @@ pub(super) fn run(request: &Request<'_>, most: usize) -> Result<Vec<Placement>, 
             drafts.insert(at, draft);
         }
     }
-    let mut placements = Vec::new();
+    let mut placements: Vec<Placement> = Vec::new();
     for draft in drafts {
         match placement(&task, draft) {
             Ok(placement) => placements.push(placement),
@@ -52,6 +52,8 @@ pub(super) fn run(request: &Request<'_>, most: usize) -> Result<Vec<Placement>, 
             break;
         }
     }
+    // The scenes' own numbers are rounded, and their radii are exact: near ties may change places.
+    placements.sort_by(|a, b| b.quality.score.total_cmp(&a.quality.score));
     if placements.is_empty() { Err(NoPlacement::None(refusal(&task, &count))) } else { Ok(placements) }
 }
 
