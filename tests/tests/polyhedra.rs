@@ -1,13 +1,17 @@
 //! The paper's title: an *arbitrary* polyhedral object. Random polyhedra, and meshes with noise, placed in the paper's hand and
 //! grasped in the paper's own model for 5 s, with `u_st` and without.
 
-use blindgrasp::scene::ObjectFile;
+use blindgrasp::placement::{Reach, Request, place, template};
+use blindgrasp::scene::file::FingertipFile;
+use blindgrasp::scene::{HandFile, ObjectFile, Parts};
+use blindgrasp_shared::math::Real;
 use blindgrasp_tests::polyhedra::{EXTENT_M, FACES, RandomPolyhedron, noisy_stl, polyhedron};
 use blindgrasp_tests::random::Draw;
 use blindgrasp_tests::study::{DENSITY_KG_M3, Outcome, Runs, Specimen, Study, simulate, spread};
 use std::fmt::Write as _;
 use std::fs;
 use std::path::PathBuf;
+use std::time::Instant;
 
 /// So many objects, with numbers of faces that take turns.
 fn random(draw: &mut Draw, count: usize) -> Vec<RandomPolyhedron> {
@@ -127,9 +131,7 @@ fn table(hulls: &[(Specimen, Outcome)], meshes: &[(Specimen, Outcome)]) -> Strin
     for outcome in &both {
         match (&outcome.placed, &outcome.runs) {
             (Err(why), _) => {
-                let first = why.lines().next().unwrap_or_default();
-                let words =
-                    first.split(|c: char| c.is_ascii_digit() || "`:,;".contains(c)).next().unwrap_or(first);
+                let words = why.split([':', ';', '`', '\n']).next().unwrap_or_default();
                 reason(format!("not placed: {}", words.trim()));
             }
             (Ok(_), Some(runs)) => {
@@ -199,6 +201,60 @@ fn random_polyhedra_are_grasped() {
 #[ignore = "takes minutes; prints the table of the README"]
 fn the_whole_table() {
     check(&study(1000, 50));
+}
+
+/// So many fingers of the paper's hand, evenly around the palm.
+fn ring(fingers: usize) -> HandFile {
+    let paper = HandFile::load("three-finger").expect("built in");
+    let (first, tip) = (&paper.joints[..4], &paper.fingertips[0]);
+    let mut hand = HandFile { joints: Vec::new(), fingertips: Vec::new(), ..paper.clone() };
+    for finger in 1..=fingers {
+        let named = |name: &str| name.replace("finger-1", &format!("finger-{finger}"));
+        let turn = (finger - 1) as f64 * std::f64::consts::TAU / fingers as f64;
+        for joint in first {
+            let mut joint = joint.clone();
+            joint.name = named(&joint.name);
+            joint.parent = joint.parent.as_deref().map(named);
+            if joint.parent.is_none() {
+                let (sine, cosine) = turn.sine_cosine();
+                // The first finger stands at -90 degrees.
+                joint.offset_m = [0.035 * sine, -0.035 * cosine, 0.0];
+                joint.rotation_rpy_rad[2] += turn;
+            }
+            hand.joints.push(joint);
+        }
+        hand.fingertips.push(FingertipFile { name: named(&tip.name), link: named(&tip.link), ..tip.clone() });
+    }
+    hand
+}
+
+/// Up to five fingers, thirty faces: how long the search takes. Prints it; what is found is sound.
+#[test]
+fn thirty_faces_are_searched_for_two_to_five_fingers() {
+    let mut draw = Draw::new(5);
+    let mut body = polyhedron(&mut draw, 30);
+    let scale = 0.07 / body.extent_m;
+    body.corners_m.iter_mut().flatten().for_each(|v| *v *= scale);
+    let object = Study::default().hull(body.corners_m);
+    for fingers in 2..=5 {
+        let like = template(ring(fingers), object.clone(), true).expect("a hand with gains");
+        let parts = Parts::of(&like).expect("a hand");
+        let begun = Instant::now();
+        let reach = Reach::of_scene(&like, &parts).expect("no trunk");
+        let mapped_s = begun.elapsed().as_secs_f64();
+        let request =
+            Request { like: &like, parts: &parts, reach: &reach, any_position: true, any_attitude: false };
+        let begun = Instant::now();
+        let placed = place(&request, 1);
+        let searched_s = begun.elapsed().as_secs_f64();
+        let chance = placed.as_ref().map(|placed| placed[0].quality.chance);
+        println!(
+            "{fingers} fingers, 30 faces: map of the reach {mapped_s:.2} s, search {searched_s:.2} s, chance {:.3}",
+            chance.unwrap_or(0.0)
+        );
+        let placed = placed.unwrap_or_else(|none| panic!("{fingers} fingers: {none}"));
+        assert!(placed[0].quality.fingertips.len() == fingers && placed[0].quality.room_rad > 0.0);
+    }
 }
 
 /// What the terms of the quality say about the outcome: of placements that are not all the best.

@@ -253,3 +253,109 @@ impl Rolling {
 pub(super) fn of(z: &Coordinates, fingertip: usize) -> Vector2<f64> {
     Vector2::new(z[2 * fingertip], z[2 * fingertip + 1])
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::plant::polyhedron::Polyhedron;
+    use blindgrasp_shared::math::Real;
+    use nalgebra::{DMatrix, DVector, Matrix3, Rotation3};
+
+    const RADII_M: [f64; 4] = [0.0138, 0.0138, 0.02, 0.01];
+    const GAINS: Gains = Gains { approach_n_m: 111.0, attitude_nm: 5e-3 };
+
+    /// The law's potentials as printed (Eqs. 43, 44), of fingertips that have rolled by `d`.
+    fn potential_j(rolling: &Rolling, z: &Coordinates, d: &DVector<f64>) -> f64 {
+        let count = rolling.count();
+        let mut centres = Vec::new();
+        let mut attitudes: Vec<Matrix3<f64>> = Vec::new();
+        for i in 0..count {
+            let [x, y] = rolling.middle.axes[i];
+            let moved = x * d[2 * i] + y * d[2 * i + 1];
+            let turn = moved.cross(&rolling.middle.inwards[i]) / RADII_M[i];
+            centres.push(rolling.centre_m(z, i) + moved);
+            attitudes.push(Rotation3::from_scaled_axis(turn).into_inner());
+        }
+        let mut squares = 0.0;
+        let mut traces = 0.0;
+        for i in 0..count {
+            squares +=
+                centres.iter().map(|other: &Vector3<f64>| (centres[i] - other).norm_squared()).sum::<f64>();
+            traces += (attitudes[i].transpose() * attitudes[(i + 1) % count]).trace();
+        }
+        GAINS.approach_n_m / (4.0 * count as f64) * squares - GAINS.attitude_nm * traces
+    }
+
+    /// Where the potential is least, by differences, is where the fingertips roll to.
+    #[test]
+    fn fingertips_roll_to_where_the_potential_is_least() {
+        let shape = Polyhedron::regular_prism(5, 0.04, 0.05).unwrap();
+        let facets: Vec<Facet> = (0..shape.faces.len()).map(|face| Facet::of(&shape, face)).collect();
+        for faces in [vec![0, 2], vec![0, 2, 3], vec![4, 1, 6, 2]] {
+            let facets: Vec<&Facet> = faces.iter().map(|&face: &usize| &facets[face]).collect();
+            let rolling = Rolling::new(&facets, &RADII_M, GAINS);
+            let rows = 2 * facets.len();
+            let z = Coordinates::from_fn(
+                |row, _| if row < rows { 1e-3 * ((row * 7 % 5) as f64 - 2.0) } else { 0.0 },
+            );
+            let at = |d: &DVector<f64>| potential_j(&rolling, &z, d);
+            let h = 1e-5;
+            let unit =
+                |row: usize, size: f64| DVector::from_fn(rows, |k, _| if k == row { size } else { 0.0 });
+            let slope = DVector::from_fn(rows, |row, _| (at(&unit(row, h)) - at(&unit(row, -h))) / (2.0 * h));
+            let bend = DMatrix::from_fn(rows, rows, |a, b| {
+                let corner = |p: f64, q: f64| at(&(unit(a, p * h) + unit(b, q * h)));
+                (corner(1.0, 1.0) - corner(1.0, -1.0) - corner(-1.0, 1.0) + corner(-1.0, -1.0))
+                    / (4.0 * h * h)
+            });
+            let roll = -bend.lu().solve(&slope).unwrap();
+            let mut squares = 0.0;
+            for i in 0..facets.len() {
+                let turn = rolling.turn_rad(&z, i);
+                for a in 0..2 {
+                    // Differences of 1e-5 m of potentials near 0.1 J: 1e-6 of them are lost.
+                    assert!((turn[a] - roll[2 * i + a] / RADII_M[i]).abs() < 1e-3, "{turn} {roll}");
+                }
+                // Minus the slope is the pull.
+                let pull = rolling.pull_n(&z, i);
+                assert!((pull[0] + slope[2 * i]).abs() < 1e-7 && (pull[1] + slope[2 * i + 1]).abs() < 1e-7);
+                squares += turn.norm_squared();
+            }
+            assert!((rolling.mean_square_turn(&z) - squares / facets.len() as f64).abs() < 1e-12);
+            let middle = Middle::new(&facets, &RADII_M, GAINS);
+            let none = Coordinates::zeros();
+            assert!((middle.mean_square_turn() - rolling.mean_square_turn(&none)).abs() < 1e-12);
+            let depths = (0..facets.len()).map(|i| rolling.normal_n(&none, i) / GAINS.approach_n_m);
+            assert!((middle.least_depth_m() - depths.fold(f64::INFINITY, f64::min)).abs() < 1e-15);
+        }
+    }
+
+    /// The derivatives that the choice of points uses, against differences.
+    #[test]
+    fn slopes_are_those_of_the_values() {
+        let shape = Polyhedron::cuboid([0.04, 0.05, 0.06]).unwrap();
+        let facets: Vec<Facet> = [0, 1, 2].iter().map(|&face| Facet::of(&shape, face)).collect();
+        let facets: Vec<&Facet> = facets.iter().collect();
+        let rolling = Rolling::new(&facets, &RADII_M, GAINS);
+        let z = Coordinates::from_fn(|row, _| if row < 6 { 1e-3 * row as f64 } else { 0.0 });
+        let (_, slope, _) = rolling.mean_square_turn_derivatives(&z);
+        for row in 0..6 {
+            let step = |size: f64| Coordinates::from_fn(|k, _| if k == row { size } else { 0.0 });
+            let value = |size: f64| rolling.mean_square_turn(&(z + step(size)));
+            assert!(
+                (slope[row] - (value(1e-4) - value(-1e-4)) / 2e-4).abs() < 1e-8 * (1.0 + slope[row].abs())
+            );
+            for i in 0..3 {
+                let (at_zero, depth) = rolling.depth_row(i);
+                let expected = rolling.normal_n(&(z + step(1e-3)), i) / GAINS.approach_n_m;
+                assert!((at_zero + depth.dot(&(z + step(1e-3))) - expected).abs() < 1e-15);
+            }
+        }
+        let apart = rolling.centre_m(&z, 0) - rolling.centre_m(&z, 1);
+        let along = apart / apart.dot(&apart).square_root();
+        let slope = rolling.apart_slope(0, 1, &along);
+        let moved = z + slope * 1e-7;
+        let grown = (rolling.centre_m(&moved, 0) - rolling.centre_m(&moved, 1)).norm() - apart.norm();
+        assert!((grown - 1e-7 * slope.norm_squared()).abs() < 1e-12);
+    }
+}
