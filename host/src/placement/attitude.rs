@@ -42,8 +42,8 @@ pub(super) fn directions(count: usize) -> Vec<Vector3<f64>> {
 mod tests {
     use super::*;
 
-    /// No rotation is farther from the nearest of the spread than 144 of them need to be: 144 balls of 35 degrees would have
-    /// twice the volume of all rotations.
+    /// The farthest rotation from the nearest of the spread. If balls of a radius could fill all rotations without overlap, 144 of
+    /// them would have 29 degrees ((t - sin t) / pi of the whole each); no spread does as well.
     #[test]
     fn attitudes_leave_no_gap() {
         let spread = spread();
