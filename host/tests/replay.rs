@@ -69,7 +69,7 @@ fn a_whole_session_gives_the_same_bits() {
     let (_folder, path) = folder();
     let mut session = armed(&path);
     session.run(500);
-    let firm = Grasp { force_n: Some(3.0), attitude_stiffness_nm: None };
+    let firm = Grasp { force_n: Some(3.0), ..Grasp::CONFIGURED };
     assert_eq!(session.command(Command::Grasp(firm)).mode, Mode::Grasping);
     session.run(1500);
     // Late ticks, fewer than are a fault; a command that is refused.

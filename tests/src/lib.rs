@@ -2,6 +2,7 @@
 //!
 //! - `board` (feature `firmware`): the image `hand`, running in QEMU; `conversation`: the host's end of a link, frame by
 //!   frame; `damage`: frames that a line has damaged.
+//! - [`cases`]: random hands with the grasp law, and the paper's potentials as they are printed.
 //! - [`description`]: a hand in the user's frames, with forward kinematics written a second time, straight from the
 //!   description.
 //! - [`random`]: seeded random numbers, rotations, inertias and hands.
@@ -16,6 +17,7 @@
 
 #[cfg(all(unix, feature = "firmware"))]
 pub mod board;
+pub mod cases;
 #[cfg(all(unix, feature = "firmware"))]
 pub mod conversation;
 #[cfg(all(unix, feature = "firmware"))]

@@ -53,8 +53,14 @@ pub struct Turned {
     pub force_n: f32,
     /// The attitude stiffness `K_st` that acts, N m.
     pub attitude_stiffness_nm: f32,
-    /// Work of the joints in the last second, J.
-    pub energy_j: f32,
+    /// The gain `K_I` of the earlier law that acts, N m/rad.
+    pub integral_gain_nm_rad: f32,
+    /// Work of the motors since the grasp began, J.
+    pub work_j: f32,
+    /// What the law's damping took of it, J.
+    pub damped_j: f32,
+    /// Work of the last second beyond the drop of the potentials, J.
+    pub excess_j: f32,
     /// The mode.
     pub mode: Mode,
     /// The fault that the hand is in.
@@ -97,7 +103,10 @@ impl Controller for Supervised {
                 limiting,
                 force_n: record.force_n,
                 attitude_stiffness_nm: record.attitude_stiffness_nm,
-                energy_j: record.energy_j,
+                integral_gain_nm_rad: record.integral_gain_nm_rad,
+                work_j: record.work_j,
+                damped_j: record.damped_j,
+                excess_j: record.excess_j,
                 mode: record.mode,
                 fault: record.fault,
             });

@@ -713,7 +713,7 @@ fn a_reversed_motor_is_not_seen_by_its_work() {
     let mut fallen = 0;
     for joint in 0..JOINTS {
         let outcome = run(&scene, &Course { reversed_motors: vec![(500, joint)], ..Course::default() });
-        let work_j = largest(outcome.turned[500..].iter().map(|turned| f64::from(turned.energy_j)));
+        let work_j = largest(outcome.turned[500..].iter().map(|turned| f64::from(turned.excess_j)));
         let limit_j = config(&scene).faults.energy_j.map_or(f64::INFINITY, f64::from);
         assert!(work_j < 0.01 * limit_j, "joint {joint}: {work_j} J of {limit_j} J");
         assert!(outcome.found().is_none_or(|(_, raised)| raised.fault != Fault::TooMuchEnergy));

@@ -58,6 +58,7 @@ impl Setup<'_> {
         GraspConfig {
             force_n: T::from_f64(self.control.force_n),
             attitude_stiffness_nm: T::from_f64(self.control.attitude_stiffness_nm),
+            integral_gain_nm_rad: T::from_f64(self.control.integral_gain_nm_rad),
             damping_nm_s: self.each(|joint| self.damping_nm_s(joint)),
             gravity_m_s2: self.control.gravity_compensation.then(gravity),
         }
@@ -88,6 +89,7 @@ impl Setup<'_> {
             limits: LimitConfig {
                 force_n: limited.then_some((FIRMEST * control.force_n) as f32),
                 attitude_stiffness_nm: limited.then_some((FIRMEST * control.attitude_stiffness_nm) as f32),
+                integral_gain_nm_rad: limited.then_some((FIRMEST * control.integral_gain_nm_rad) as f32),
                 torque_nm: limited.then(|| self.each(|joint| joint.torque_limit_nm)),
                 slew_nm_s: match actuators.slew_limit_nm_s {
                     Some(limit) => Some(self.each(|_| limit)),
