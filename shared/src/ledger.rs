@@ -13,9 +13,9 @@
 //! long as torques are what the law asks for, and when it asks, `work = -(change of V) - damped`, and the excess is what
 //! the damping takes, with a minus. Whatever else turns up in it was fed by the controller in spite of its law:
 //! torques that are held for a tick, and come late; speeds that are estimated late; limits that cut off and give back.
-//! Energy that grows in a swing is seen as excess, energy that somebody puts in from outside is not: then the work
-//! is negative and the potentials rise. Nor is a motor the wrong way round, which looks the same; or an encoder of the
-//! wrong scale, since both sides of the balance are reckoned from it.
+//! Energy that the controller puts into a swing is seen as excess. Energy that somebody puts in from outside is not: the
+//! potentials rise, and the work is what they take. Nor is a motor or an encoder the wrong way round, which looks the same;
+//! or an encoder of the wrong scale, since both sides of the balance are reckoned from it.
 //!
 //! - `V` is `V_s + V_st + V_I`, less the potential energy of the links' weight that the law holds. Each but the last
 //!   is its gain times a function of the posture. Gains that change (soft start, release) give and take potential

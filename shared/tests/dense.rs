@@ -104,11 +104,9 @@ fn golden_bytes() {
         "f2",   // nibbles; all parts
         "0e0c", // cycles / 4
         "12",   // late, dropped
-        // Gains and approach, which are new to the sender, and what is new to the record: work and excess.
-        "53", // which of law and ledger
-        "0045",
-        "0000",
-        "0000", // gains
+        // Force and approach, which are new to the sender, and what is new to the record: work and excess.
+        "a5",   // which of law and ledger
+        "0045", // force
         "0034",
         "00b8",
         "002c", // approach, work, excess

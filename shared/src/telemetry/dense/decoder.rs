@@ -8,7 +8,7 @@ use crate::event::Events;
 use crate::fault::{Fault, Raised};
 use crate::limit::Limiting;
 use crate::supervisor::Mode;
-use crate::telemetry::{DecodeError, LAW, List, Record};
+use crate::telemetry::{DecodeError, List, Record};
 use half::f16;
 
 /// Why there is no record in a dense form.
@@ -65,11 +65,7 @@ pub(crate) fn read<const J: usize>(
     let [mode_events, flags] = body.array()?;
     let cycles = 4 * u32::from(body.u16()?);
     let grown = body.byte()?;
-    let malformed = Undecoded::Bytes(DecodeError::Malformed);
     let sent = body.byte()?;
-    if sent >= law_bit(LAW) {
-        return Err(malformed);
-    }
     let mut law = before.law();
     for (k, number) in law.iter_mut().enumerate() {
         // What is not sent has not changed, as it is sent.
@@ -77,6 +73,7 @@ pub(crate) fn read<const J: usize>(
     }
     let fault = if flags & HAS_FAULT != 0 { Some(body.raised()?) } else { None };
     let reading_failed = if flags & HAS_READING_FAILED != 0 { Some(body.raised()?) } else { None };
+    let malformed = Undecoded::Bytes(DecodeError::Malformed);
     let mode = Mode::ALL.get(usize::from(mode_events & 0b111)).copied().ok_or(malformed)?;
     let events = Events::from_bits(mode_events >> 3).ok_or(malformed)?;
 

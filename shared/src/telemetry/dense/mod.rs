@@ -79,9 +79,10 @@ fn halves<const J: usize>(record: &Record<f32, J>) -> [u16; LAW] {
     record.law().map(|number| f16::from_f32_const(number).to_bits())
 }
 
-/// Which bit says that a number of law and ledger is sent. The gains, which change together if at all, share the first.
+/// Which bit says that a number of law and ledger is sent. The attitudes' stiffness and the integral's gain, which change
+/// together if at all, share one.
 const fn law_bit(k: usize) -> u8 {
-    1 << k.saturating_sub(2)
+    1 << if k < 2 { k } else { k - 1 }
 }
 
 fn half(value: f32) -> f32 {
