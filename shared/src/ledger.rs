@@ -26,8 +26,8 @@
 //!   amplifiers have it; the mean errs by half a tick either way.
 //!
 //! **Digits.** Work and damping are added up since the grasp began, for hours, in single precision: each sum keeps
-//! what rounding takes from it (Kahan), so that it errs by its own rounding, one part in 16 million, and not by that of millions
-//! of entries. The excess fades: of what was done a second ago 1/e counts. It cannot lose digits, and it does not let
+//! what rounding takes from it (Kahan), so that it errs by its own rounding, one part in 16 million, and not by that of
+//! millions of entries. The excess fades: of what was done a second ago 1/e counts. It cannot lose digits, and it does not let
 //! an hour of damping make up for a second of swing.
 
 use crate::buffer::BufferTooSmall;
@@ -221,5 +221,94 @@ impl<const J: usize> Ledger<f32, J> {
 impl<T: Real, const J: usize> Default for Ledger<T, J> {
     fn default() -> Self {
         Self::new()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const PERIOD_S: f32 = 1e-3;
+
+    /// A law with a potential `V_s`, J, at a force of one newton for each joule.
+    fn approach(potential_j: f32, damping_w: f32) -> Option<Doing<f32>> {
+        Some(Doing {
+            gains: Gains { force_n: potential_j, ..Gains::none() },
+            monitor: Monitor { approach_potential_j: potential_j, ..Monitor::none() },
+            damping_w,
+        })
+    }
+
+    /// Enters a tick of one joint.
+    fn enter(ledger: &mut Ledger<f32, 1>, moved_rad: f32, last_nm: f32, law: Option<Doing<f32>>) {
+        let motion = Motion { moved_rad: [moved_rad], ..Motion::still() };
+        ledger.enter(&Entry { motion: &motion, last_nm: &[last_nm], law, period_s: PERIOD_S });
+    }
+
+    /// Two hours of little steps in single precision, against the same in double: the sum that is kept errs by its own
+    /// rounding only. Without what it keeps, it would be off by more than a hundredth.
+    #[test]
+    fn hours_lose_no_digits() {
+        let mut ledger = Ledger::<f32, 1>::new();
+        let (mut exact_j, mut exact_damped_j, mut plain_j) = (0.0_f64, 0.0_f64, 0.0_f32);
+        for k in 0..2 * 3_600_000_u32 {
+            let (moved_rad, damping_w) = (1e-5 + 1e-9 * (k % 1000) as f32, 2e-4 + 1e-8 * (k % 77) as f32);
+            enter(&mut ledger, moved_rad, 0.3, approach(0.2, damping_w));
+            if k > 0 {
+                exact_j += f64::from(0.3_f32 * moved_rad);
+                plain_j += 0.3 * moved_rad;
+            }
+            exact_damped_j += f64::from(damping_w * PERIOD_S);
+        }
+        // Of the first tick only the last torque counts, as half of the mean with none before.
+        exact_j += 0.5 * f64::from(0.3_f32 * 1e-5);
+        let error = |sum_j: f32, exact_j: f64| (f64::from(sum_j) / exact_j - 1.0).abs();
+        let errors = [error(ledger.work_j(), exact_j), error(ledger.damped_j(), exact_damped_j)];
+        std::println!(
+            "{exact_j} J and {exact_damped_j} J: off by {errors:?}; plainly {:.1e}",
+            error(plain_j, exact_j)
+        );
+        assert!(errors.into_iter().all(|error| error < f64::from(f32::EPSILON)));
+        assert!(error(plain_j, exact_j) > 1e-2);
+    }
+
+    /// A posture that stays does no work, whatever becomes of the gains.
+    #[test]
+    fn gains_that_change_are_no_work() {
+        let mut ledger = Ledger::<f32, 1>::new();
+        for k in (0..=100).chain((0..100).rev()) {
+            let share = k as f32 / 100.0;
+            enter(&mut ledger, 0.0, share, approach(0.25 * share, 0.0));
+            assert!(ledger.excess_j().abs() < 1e-6, "{k}: {}", ledger.excess_j());
+        }
+        assert_eq!(ledger.work_j(), 0.0);
+    }
+
+    /// Work beside what the potential gives is excess, which fades by 1/e in a second; without torque there is none.
+    #[test]
+    fn what_the_potential_does_not_give_is_excess() {
+        let mut ledger = Ledger::<f32, 1>::new();
+        enter(&mut ledger, 0.0, 0.0, approach(1.0, 0.0));
+        enter(&mut ledger, 0.0, 2.0, approach(1.0, 0.0));
+        let law = |potential_j: f32| {
+            let mut law = approach(1.0, 0.5);
+            law.iter_mut().for_each(|doing| doing.monitor.approach_potential_j = potential_j);
+            law
+        };
+        // 2 N m over 0.25 rad, for which the potential falls by 0.375 J only.
+        enter(&mut ledger, 0.25, 2.0, law(0.625));
+        assert_eq!((ledger.work_j(), ledger.excess_j()), (0.5, 0.125));
+        for _ in 0..1000 {
+            enter(&mut ledger, 0.0, 2.0, law(0.625));
+        }
+        assert!((ledger.excess_j() / 0.125 - 0.368).abs() < 1e-3);
+        assert!((ledger.damped_j() - 0.5).abs() < 1e-3);
+        // Somebody pushes the joint back.
+        enter(&mut ledger, -0.25, 2.0, law(1.0));
+        assert_eq!(ledger.work_j(), 0.0);
+        enter(&mut ledger, 0.1, 2.0, None);
+        assert_eq!((ledger.work_j(), ledger.excess_j()), (0.2, 0.0));
+        ledger.open();
+        assert_eq!((ledger.work_j(), ledger.damped_j()), (0.0, 0.0));
     }
 }

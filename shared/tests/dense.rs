@@ -104,12 +104,10 @@ fn golden_bytes() {
         "f2",   // nibbles; all parts
         "0e0c", // cycles / 4
         "12",   // late, dropped
-        // Force and approach, which are new to the sender, and what is new to the record: work and excess.
-        "a5",   // which of law and ledger
-        "0045", // force
-        "0034",
+        // What is new: work and excess.
+        "a0", // which of law and ledger
         "00b8",
-        "002c", // approach, work, excess
+        "002c", // those
         "0302",
         "09ff",                                             // faults
         "d9e8e8e8e8e8e8e8e8e8e8eb",                         // counts
@@ -153,10 +151,20 @@ fn full_records_come_where_they_must() {
     }
     let every = FULL_EVERY_TICKS;
     assert_eq!(full, [0, 30, 50, 60, 60 + every, 60 + 2 * every, 60 + 3 * every, 60 + 4 * every]);
+    // A device that was late and dropped much before anybody listened begins with one.
+    let mut sender = Sender::<12>::new();
+    let busy = |tick| Record { late_ticks: 40 + tick / 2, dropped: 99, ..record(tick) };
+    let full = (0..50).filter(|&tick| sent(&mut sender, &busy(tick), Signals::FULL)[0] != TAG);
+    assert_eq!(full.collect::<Vec<_>>(), [0]);
+    // Nor is it another list whether snapshots are sent.
+    let stateless = Signals::ALL.and(Signals::DENSE);
+    assert_eq!(sent(&mut sender, &busy(50), stateless)[0], TAG);
     // Without DENSE all are; and with other signals the first is.
-    assert_eq!(sent(&mut sender, &record(501), Signals::ALL)[0], 3);
+    let mut sender = Sender::<12>::new();
+    (0..3).for_each(|tick| drop(sent(&mut sender, &record(500 + tick), Signals::FULL)));
+    assert_eq!(sent(&mut sender, &record(503), Signals::ALL)[0], 3);
     // So many that who hears none of them knows that it has lost too many.
-    let full = (502..520)
+    let full = (504..520)
         .take_while(|&tick| sent(&mut sender, &record(tick), Signals::LIMITING.and(Signals::DENSE))[0] == 3);
     assert_eq!(full.count(), WINDOW);
 }

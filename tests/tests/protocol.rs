@@ -493,11 +493,7 @@ fn streams() -> Vec<serde_json::Value> {
             payload.len()
         })
         .collect();
-    assert_eq!(
-        lengths[1] - lengths[12],
-        2 * 8,
-        "all but the integral's potential, which is zero, and then nothing"
-    );
+    assert!(lengths[1..].iter().all(|&length| length == lengths[12]), "{lengths:?}");
     let works = |k| Record { work_j: 0.25, ..resting(k) };
     stream.lose(&works(13));
     (14..22).for_each(|k| assert_eq!(stream.arrive(&works(k)), Ok(true)));

@@ -722,7 +722,7 @@ pub(super) mod tests {
         assert!(first.is_some() && (second.most - at(999.0)).abs() < 1e-4, "{second:?}");
         for plot in Plot::ALL {
             let count = model.plotted(plot, Some(0), ms(1000), ms(1000), 3).len();
-            assert_eq!(count, if plot == Plot::Potentials { 2 } else { 1 }, "{plot:?}");
+            assert_eq!(count, plot.signals().len().max(1), "{plot:?}");
         }
     }
 }

@@ -15,7 +15,7 @@
 //! - what the fingers' joints put on an object need not sum to zero, and joints that carry all fingers pull the hand back
 //!   to where it grasped: an arm feels it, and it disturbs whoever moves the object.
 //!
-//! Departure: one gain for all joints, as the paper speaks of it; the references have one a joint.
+//! The paper names this law without printing it (Secs. 1 and 3). One gain serves all joints.
 
 use crate::math::Real;
 

@@ -70,15 +70,21 @@ impl<const J: usize> Encoder<J> {
 
     /// Takes the next record that is sent: what its dense form is made of, or `None` where it has to be sent in full.
     pub(crate) fn next(&mut self, record: &Record<f32, J>, signals: Signals) -> Option<Shape> {
+        let law = halves(record);
+        let Record { late_ticks, dropped, .. } = *record;
+        if self.full_tick.is_none() {
+            // Nobody knows anything of what was before the first.
+            self.past = [Past { change: 0, law: 0, late_ticks, dropped }; WINDOW];
+            self.law = law;
+        }
         let most = u32::from(u8::MAX >> 4);
         let oldest = self.past.get(self.oldest).copied();
         let grows_slowly = oldest.is_some_and(|past| {
-            record.late_ticks.wrapping_sub(past.late_ticks) <= most
-                && record.dropped.wrapping_sub(past.dropped) <= most
+            late_ticks.wrapping_sub(past.late_ticks) <= most && dropped.wrapping_sub(past.dropped) <= most
         });
         // A receiver knows which lists there are from a full record: with other signals, none but full ones are sent until
         // it has one, or has lost too many.
-        let parts = signals.without(Signals::DENSE);
+        let parts = signals.without(Signals::DENSE).without(Signals::STATE);
         if self.full_tick.is_some() && parts != self.signals {
             self.full_left = WINDOW;
         }
@@ -96,12 +102,10 @@ impl<const J: usize> Encoder<J> {
 
         let changes = counts.iter().zip(before).map(|(new, old)| new.wrapping_sub(*old).unsigned_abs());
         let change = changes.max().unwrap_or(0);
-        let law = halves(record);
         let others = law.iter().zip(&self.law).enumerate().filter(|(_, (now, before))| now != before);
         let changed = others.fold(0, |changed, (k, _)| changed | law_bit(k));
         self.law = law;
         if let Some(past) = self.past.get_mut(self.oldest) {
-            let Record { late_ticks, dropped, .. } = *record;
             *past = Past { change, law: changed, late_ticks, dropped };
         }
         self.oldest = (self.oldest + 1) % WINDOW;
