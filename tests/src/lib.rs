@@ -27,7 +27,6 @@ pub mod grasps;
 pub mod hands;
 pub mod images;
 pub mod numeric;
-pub mod polyhedra;
 pub mod random;
 pub mod supervised;
 pub mod thumb;

@@ -28,10 +28,33 @@ const VALUE_LABELS_WIDTH: i32 = 74;
 /// Left of the rotated label, which Plotters sets flush.
 const VALUE_MARGIN: i32 = 8;
 const TITLE_SIZE: i32 = 21;
+/// Of a panel alone.
+const PANEL_WIDTH: i32 = 460;
+const PANEL_HEIGHT: i32 = 190;
 
 impl Figure {
+    /// One panel alone as an SVG element, without title and legend: for a page that has its own, and that is read on a
+    /// telephone too. `None` if there is no such panel.
+    ///
+    /// # Errors
+    /// What the drawing library says.
+    pub fn panel_svg(&self, k: usize) -> Option<Result<String, String>> {
+        self.panels.get(k).map(|panel| {
+            let (width, height) = (PANEL_WIDTH, PANEL_HEIGHT + TIME_LABELS_HEIGHT);
+            svg_of((width, height), |root| {
+                text::register_with_plotters();
+                root.fill(&WHITE).map_err(reason)?;
+                self.draw_panel(panel, root, true, width, SVG_SCALE)?;
+                root.present().map_err(reason)
+            })
+        })
+    }
+
     /// The figure as a PNG file.
-    pub(super) fn png(&self) -> Result<Vec<u8>, String> {
+    ///
+    /// # Errors
+    /// What the drawing library says.
+    pub fn png(&self) -> Result<Vec<u8>, String> {
         let (width, height) = self.size(BITMAP_SCALE);
         let mut canvas = Canvas::new(width as usize, height as usize);
         let root = Pen(&mut canvas).into_drawing_area();
@@ -41,18 +64,12 @@ impl Figure {
     }
 
     /// The figure as an SVG file.
-    pub(super) fn svg(&self) -> Result<Vec<u8>, String> {
-        let (width, height) = self.size(SVG_SCALE);
-        let mut file = String::new();
-        let root = SVGBackend::with_string(&mut file, (width, height)).into_drawing_area();
-        self.draw(&root, SVG_SCALE)?;
-        drop(root);
-        // The size in which a viewer shows it; the view box keeps the fine units.
-        let fine = format!("width=\"{width}\" height=\"{height}\" viewBox");
-        let shown = self.size(1);
-        Ok(file
-            .replacen(&fine, &format!("width=\"{}\" height=\"{}\" viewBox", shown.0, shown.1), 1)
-            .into_bytes())
+    ///
+    /// # Errors
+    /// What the drawing library says.
+    pub fn svg(&self) -> Result<Vec<u8>, String> {
+        let (width, height) = self.size(1);
+        svg_of((width as i32, height as i32), |root| self.draw(root, SVG_SCALE)).map(String::into_bytes)
     }
 
     /// Width and height.
@@ -84,7 +101,7 @@ impl Figure {
             let (_, below) = root.split_vertically(top * scale);
             let (area, _) = below.split_vertically(height * scale);
             let (chart, legend) = area.split_horizontally((WIDTH - legend::WIDTH) * scale);
-            self.draw_panel(panel, &chart, last, scale)?;
+            self.draw_panel(panel, &chart, last, WIDTH - legend::WIDTH, scale)?;
             legend::draw(panel, &legend, scale)?;
             top += height;
         }
@@ -96,6 +113,7 @@ impl Figure {
         panel: &Panel,
         area: &DrawingArea<B, Shift>,
         last: bool,
+        width: i32,
         scale: i32,
     ) -> Result<(), String> {
         let time = series::to_next_tick(series::time_range(&self.times), 8);
@@ -158,7 +176,7 @@ impl Figure {
             return area.draw(&Text::new("no values above zero", at, style)).map_err(reason);
         }
         // Columns of the bitmap as it is shown: finer ones can't be told apart.
-        let columns = (WIDTH - legend::WIDTH - VALUE_LABELS_WIDTH) as usize;
+        let columns = (width - VALUE_LABELS_WIDTH) as usize;
         for line in &panel.lines {
             let values: Vec<f64> = match decades {
                 // Zero has no logarithm; it sits on the lower edge with all that is too small.
@@ -171,6 +189,22 @@ impl Figure {
         }
         Ok(())
     }
+}
+
+/// An SVG file of a width and a height.
+fn svg_of(
+    (width, height): (i32, i32),
+    draw: impl FnOnce(&DrawingArea<SVGBackend<'_>, Shift>) -> Result<(), String>,
+) -> Result<String, String> {
+    let (fine_width, fine_height) = (width * SVG_SCALE, height * SVG_SCALE);
+    let mut file = String::new();
+    let root =
+        SVGBackend::with_string(&mut file, (fine_width as u32, fine_height as u32)).into_drawing_area();
+    draw(&root)?;
+    drop(root);
+    // The size in which a viewer shows it; the view box keeps the fine units.
+    let fine = format!("width=\"{fine_width}\" height=\"{fine_height}\" viewBox");
+    Ok(file.replacen(&fine, &format!("width=\"{width}\" height=\"{height}\" viewBox"), 1))
 }
 
 /// A linear axis with its ticks where we want them.

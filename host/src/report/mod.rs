@@ -30,19 +30,24 @@ mod palette;
 mod palm;
 mod pens;
 mod picture;
-mod plots;
+pub mod plots;
 mod quantise;
 mod raster;
 mod scene3d;
 mod series;
 mod skeleton;
 mod sketch;
+mod strip;
 #[cfg(test)]
 mod tests;
 mod text;
 
+pub use figure::{Axis, Figure, Line, Panel};
 pub use input::Report;
+pub use palette::{Rgb, of as colour};
+pub use pens::Dash;
 pub use sketch::{hand_svg, object_svg};
+pub use strip::Strip;
 
 use std::path::{Path, PathBuf};
 use std::{fs, io};

@@ -153,6 +153,11 @@ impl<T: Real, const J: usize> GraspLaw<T, J> {
         self.attitude_stiffness_nm
     }
 
+    /// `C` of each joint, N m s/rad.
+    pub fn damping_nm_s(&self) -> &[T; J] {
+        &self.damping_nm_s
+    }
+
     /// The whole grip, as configured.
     pub fn grip<'a, const F: usize>(&self, latch: &'a Latch<T, F>) -> Grip<'a, T, F> {
         Grip { latch, force_n: self.force_n, attitude_stiffness_nm: self.attitude_stiffness_nm }
