@@ -18,6 +18,7 @@ pub mod inspect;
 pub mod monitor;
 #[cfg(feature = "command")]
 pub mod paper;
+pub mod placement;
 pub mod plant;
 pub mod record;
 #[cfg(feature = "command")]

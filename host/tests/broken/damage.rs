@@ -58,7 +58,7 @@ fn damaged_copies_are_refused_in_one_line_or_can_be_written_and_read_again() {
             // Of every second nothing was wrong.
             let originals = if copy % 2 == 0 { &good } else { &seeds };
             let mut bytes = originals[random.usize(..originals.len())].clone();
-            for _ in 0..random.usize(1..=3) {
+            for _ in 0..random.usize(1..=if copy % 2 == 0 { 1 } else { 3 }) {
                 damage(&mut bytes, &seeds, &mut random);
             }
             accepted += usize::from(reader.check(&bytes, folder.path()));
@@ -68,7 +68,7 @@ fn damaged_copies_are_refused_in_one_line_or_can_be_written_and_read_again() {
             seeds.len(),
             good.len()
         );
-        assert!(accepted > COPIES / 50 && accepted < COPIES);
+        assert!(accepted > COPIES / 100 && accepted < COPIES);
     }
 }
 

@@ -3,6 +3,7 @@
 //! `damage`.
 
 #![cfg(unix)]
+#![allow(clippy::unwrap_used, reason = "only tests are here")]
 
 mod damage;
 mod input;

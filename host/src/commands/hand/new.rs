@@ -66,10 +66,8 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
 
 /// How a file in a folder names another: relative, unless it was named by an absolute path and is further up.
 fn relative(file: &Path, folder: &Path) -> PathBuf {
-    let whole = |path: Option<&Path>| match path {
-        None => Path::new(".").canonicalize(),
-        Some(path) if path.as_os_str().is_empty() => Path::new(".").canonicalize(),
-        Some(path) => path.canonicalize(),
+    let whole = |folder: Option<&Path>| {
+        folder.filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new(".")).canonicalize()
     };
     let (Ok(from), Ok(to), Some(name)) = (whole(Some(folder)), whole(file.parent()), file.file_name()) else {
         return file.to_path_buf(); // It can't be read either, which is told there.

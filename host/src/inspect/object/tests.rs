@@ -5,7 +5,7 @@ use crate::plant::polyhedron::samples::{Mesh, bracket, grid_box, icosphere, plat
 
 fn file((vertices, triangles): &Mesh) -> ObjectFile {
     let shape = ShapeFile::mesh(vertices.iter().map(|&v| v.into()).collect(), triangles.clone());
-    ObjectFile { density_kg_m3: Some(20.0), ..bare("part.stl", shape) }
+    ObjectFile { density_kg_m3: Some(20.0), ..bare(shape) }
 }
 
 fn check(mesh: &Mesh) -> ObjectCheck {

@@ -74,6 +74,7 @@ impl Assembly {
         refuse_crowd(robot, assembly.joints.len())?;
         assembly.merge(robot, true)?;
         notices.extend(tell_idle(robot, &assembly.idle(robot, keys)));
+        notices.extend(tell_massless(robot, &assembly.joints));
         Ok(assembly)
     }
 
@@ -324,6 +325,23 @@ pub(in crate::scene) fn toml_key(name: &str) -> String {
     } else {
         toml::Value::String(name.into()).to_string()
     }
+}
+
+/// Links that move, have an extent, and weigh nothing. Links of joints that share a place are points.
+fn tell_massless(robot: &Robot, joints: &[Moving]) -> Vec<Notice> {
+    let has_extent =
+        |k: usize| joints.iter().any(|other| other.parent == Some(k) && other.offset_m != [0.0; 3]);
+    let massless = joints.iter().enumerate().filter(|(k, moving)| moving.body.is_none() && has_extent(*k));
+    massless
+        .map(|(_, moving)| {
+            let link = &robot.links[robot.joints[moving.joint].child];
+            Notice {
+                place: link.place.clone(),
+                what: format!("link `{}` moves and has no mass", quote(&link.name)),
+                remedy: "add <inertial>, unless its mass is counted in another link".into(),
+            }
+        })
+        .collect()
 }
 
 /// Joints that could move, but move no fingertip.

@@ -14,6 +14,32 @@ use std::f64::consts::PI;
 /// Torques, N m, and speeds, rad/s, from which on a limit is taken for a placeholder.
 pub(super) const PLACEHOLDER: f64 = 1000.0;
 
+/// What is odd with the joints: many have the same, which is told of the first.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Oddities(Vec<(&'static str, Notice, usize)>);
+
+impl Oddities {
+    fn extend(&mut self, kind: &'static str, notice: Option<Notice>) {
+        let Some(notice) = notice else { return };
+        match self.0.iter_mut().find(|(other, ..)| *other == kind) {
+            Some((.., count)) => *count += 1,
+            None => self.0.push((kind, notice, 1)),
+        }
+    }
+
+    /// One notice a kind.
+    pub(super) fn notices(self) -> impl Iterator<Item = Notice> {
+        self.0.into_iter().map(|(_, notice, count)| match count {
+            1 => notice,
+            2 => Notice { what: notice.what + " (and so it is with another joint)", ..notice },
+            _ => Notice {
+                what: format!("{} (and so it is with {} more joints)", notice.what, count - 1),
+                ..notice
+            },
+        })
+    }
+}
+
 /// Adds to the entry of a joint what the URDF says and the entry does not. `is_default` tells whether `[joint_defaults]` has a
 /// key, `parent_key` is that of the entry's parent.
 ///
@@ -25,7 +51,7 @@ pub(super) fn complete(
     index: usize,
     parent_key: &str,
     is_default: &dyn Fn(&str) -> bool,
-    notices: &mut Vec<Notice>,
+    oddities: &mut Oddities,
 ) -> Result<()> {
     let moving = &parts.assembly.joints[index];
     let joint = parts.joint(moving);
@@ -55,7 +81,7 @@ pub(super) fn complete(
         }
     }
 
-    set_range(node, joint, is_default, notices)?;
+    set_range(node, joint, is_default, oddities)?;
     let limit = &joint.limit;
     for (key, attribute, given, unit) in [
         ("torque_limit_nm", "effort", limit.effort, "N m"),
@@ -67,7 +93,7 @@ pub(super) fn complete(
         // A joint that may not push or not move is one whose limit nobody knew.
         match parts.keys.heeded(attribute, given).filter(|value| *value > 0.0) {
             Some(value) => {
-                notices.extend(placeholder(joint, key, attribute, value, unit));
+                oddities.extend(attribute, placeholder(joint, key, attribute, value, unit));
                 node.insert(key, number(value, &limit.place));
             }
             None if is_default(key) => {}
@@ -81,7 +107,7 @@ pub(super) fn complete(
             }
         }
     }
-    notices.extend(too_much_friction(node, joint));
+    oddities.extend("friction", too_much_friction(node, joint));
     for key in ["damping_gain_nm_s_rad", "encoder_counts_per_turn"] {
         if node.get(key).is_none() && !is_default(key) {
             return Err(
@@ -126,7 +152,7 @@ fn set_range(
     node: &mut Node,
     joint: &Joint,
     is_default: &dyn Fn(&str) -> bool,
-    notices: &mut Vec<Notice>,
+    oddities: &mut Oddities,
 ) -> Result<()> {
     let key = "limits_rad";
     if node.get(key).is_some() {
@@ -136,11 +162,12 @@ fn set_range(
     let [lower, upper] = match (joint.kind, joint.limit.lower, joint.limit.upper) {
         (Kind::Continuous, ..) | (_, None, None) if is_default(key) => return Ok(()),
         (Kind::Continuous, ..) => {
-            notices.push(Notice {
+            let notice = Notice {
                 place: joint.place.clone(),
                 what: format!("{} is continuous: its limits are taken as -pi and pi", of(joint)),
                 remedy: format!("give `{key}` in its [[joint]]"),
-            });
+            };
+            oddities.extend("continuous", Some(notice));
             [-PI, PI]
         }
         (_, None, None) => return Err(lacking(joint, "no limits", key).at(place)),

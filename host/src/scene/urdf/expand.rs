@@ -7,7 +7,7 @@ use super::super::library::Home;
 use super::super::read::read;
 use super::super::tree::{Entry, Node, Value};
 use super::assembly::{Assembly, Moving, Seat};
-use super::complete::{complete, list, text};
+use super::complete::{Oddities, complete, list, text};
 use super::keys::Keys;
 use super::robot::{Joint, Kind, Robot};
 use super::topology::Tree;
@@ -121,12 +121,14 @@ impl Parts<'_> {
             }
         };
         let mut items = Vec::with_capacity(count);
+        let mut oddities = Oddities::default();
         for (k, (index, mut node)) in entries.into_iter().enumerate() {
             let is_default =
                 |key: &str| hand.get("joint_defaults").is_some_and(|table| table.get(key).is_some());
-            complete(self, &mut node, index, &item("joint", k, "parent"), &is_default, notices)?;
+            complete(self, &mut node, index, &item("joint", k, "parent"), &is_default, &mut oddities)?;
             items.push(node);
         }
+        notices.extend(oddities.notices());
         let array = Node { value: Value::Array(items), place: self.place.clone() };
         hand.insert("joint", array);
         Ok(())

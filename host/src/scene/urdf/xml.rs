@@ -81,7 +81,7 @@ impl<'a> Text<'a> {
                     // Its position is told as a line already.
                     let words = error.to_string().replacen(&format!(" at {position}"), "", 1);
                     let place = self.lines.line(position.row as usize);
-                    let is_robot = self.text.contains("<robot");
+                    let is_robot = self.text.contains("<robot") || self.text.contains("</robot");
                     let remedy = if is_robot { "correct it there or before" } else { "is this a URDF?" };
                     (format!("not XML: {}", quote(&words)), remedy, place)
                 }

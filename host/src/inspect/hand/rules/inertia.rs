@@ -60,9 +60,8 @@ fn mass_centre(specimen: &Specimen, k: usize, found: &mut Found) {
     }
 }
 
-/// A link without extent, mass and inertia is counted in another; all others need both, and those of a body.
+/// A link without mass and inertia is counted in another; one with either needs both, and those of a body.
 fn inertia(specimen: &Specimen, k: usize, found: &mut Found) {
-    let sizes_known = found.trusts(&["offset_m", "radius_m"]);
     let link = specimen.hand.link(k);
     let moments = SymmetricEigen::new(link.inertia_kg_m2).eigenvalues;
     let (least, most) = (moments.min(), moments.max());
@@ -73,12 +72,6 @@ fn inertia(specimen: &Specimen, k: usize, found: &mut Found) {
     if !(most > 0.0) {
         if link.mass_kg > 0.0 {
             tell(Severity::Warning, format!("has a mass of {} kg and no inertia", link.mass_kg), about);
-            return;
-        }
-        let size = size_m(specimen, k, &Vector3::zeros());
-        if size > 0.0 && sizes_known {
-            let what = format!("has neither mass nor inertia, on a link of {}", length(size));
-            tell(Severity::Warning, what, "give mass_kg and inertia_kg_m2, or <inertial> in the URDF");
         }
         return;
     }

@@ -115,7 +115,7 @@ fn guess(robot: &Robot, tree: &Tree, keys: &Keys) -> Result<Vec<Tip>> {
     };
     match told.len() {
         0 => {
-            let remedy = "a hand needs revolute joints that --lock does not hold still";
+            let remedy = "a hand needs revolute joints below its base that --lock does not hold still";
             Err(SceneError::new("", "no joint moves", remedy).at(&robot.place))
         }
         1 => Err(unclear(robot, &format!("only link {} looks like a fingertip", names()))),

@@ -129,7 +129,7 @@ impl<'a> Draft<'a> {
         let mut guesses = Vec::new();
         match &self.idle[..] {
             [] => {}
-            [names @ ..] if names.len() <= MOST_NAMES => {
+            names if names.len() <= MOST_NAMES => {
                 guesses.push(format!("held still, as they move no fingertip: {}", names.join(", ")));
             }
             names => guesses.push(format!("{} joints, which move no fingertip, are held still", names.len())),

@@ -150,6 +150,14 @@ fn what_is_odd_is_a_notice() {
         assert_eq!(warnings, [expected]);
         assert_eq!(file.joints.len(), 4);
     }
+    // Many of the same are told once.
+    let (_, _, warnings) = load(HAND, &GRIPPER.replace("effort=\"1.2\"", "effort=\"1000\"")).unwrap();
+    assert_eq!(warnings.len(), 1);
+    assert!(
+        warnings[0].contains("looks like a placeholder (and so it is with another joint); if so"),
+        "{}",
+        warnings[0]
+    );
     // Each can be silenced by the hand's file.
     let quiet = changed(HAND, "base = \"palm\"", "base = \"palm\"\nignore = [\"effort\", \"friction\"]");
     let quiet = changed(&quiet, "[joint_defaults]", "[joint_defaults]\ntorque_limit_nm = 0.3");

@@ -224,7 +224,7 @@ fn errors_name_the_option() {
     );
     assert_eq!(
         refused(GRIPPER, base("left-2")),
-        "gripper.urdf:3: no link moves; name the fingertips: --fingertip LINK[:x,y,z[:radius_m]]"
+        "gripper.urdf:3: no joint moves; a hand needs revolute joints below its base that --lock does not hold still"
     );
     assert_eq!(
         refused(GRIPPER, tip("left-top")),
