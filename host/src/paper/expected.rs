@@ -21,7 +21,6 @@ pub const EXPECTED: &[(&str, &str, Verdict)] = &[
     ("bound", "*", Reproduced),
     ("square-integrable", "hand-arm", NotReproduced),
     ("square-integrable", "*", Reproduced),
-    ("counter-force", "cube-continuous", Differs),
     ("counter-force", "hand-arm", NotReproduced),
     ("counter-force", "hand-arm-consistent", NotReproduced),
     ("counter-force", "*", Reproduced),
