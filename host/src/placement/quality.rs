@@ -20,10 +20,11 @@
 //! ln(chance / (1 - chance)) = O + a ln(min m_i / rho_i) - b/2 ln(mean theta_i^2 + theta_0^2)
 //! ```
 //!
-//! The numbers O, a, b and `theta_0` were fitted to runs of random placements of random polyhedra in the paper's hand: margin
-//! and turn say most of what can be said of the outcome before it is simulated. Friction and unbalanced moment say what the
-//! turn says; room and conditioning say nothing of the paper's model, which has no end stops. `cargo test --release -p
-//! blindgrasp-tests --test polyhedra terms -- --ignored --nocapture` prints the area under the ROC curve of each term.
+//! The numbers O, a, b and `theta_0` were fitted to runs of placements of random polyhedra in the paper's hand. On 293 others the
+//! area under the ROC curve, with which it tells grasps that hold from those that are lost, is 0.91 for the chance, 0.79 for
+//! the turn alone, 0.83 for the largest friction and 0.78 for the unbalanced moment, which say what the turn says; the margin alone
+//! has 0.55, room 0.47 and conditioning 0.51: nothing, in a model without end stops (`cargo test --release -p
+//! blindgrasp-tests --test polyhedra terms -- --ignored --nocapture`).
 //! The chance is that of the paper's hand and gains; elsewhere it ranks, and promises nothing.
 //!
 //! What **ranks** is the chance, times the room in units of 0.1 rad where it is less: there the soft end stops begin.
