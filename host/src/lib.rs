@@ -16,6 +16,7 @@ pub mod device;
 pub mod inspect;
 #[cfg(feature = "command")]
 pub mod monitor;
+pub mod placement;
 pub mod plant;
 pub mod record;
 #[cfg(feature = "command")]

@@ -10,7 +10,8 @@
 //! - [`images`]: the images for the microcontroller, built.
 //! - [`grasps`]: a hand, an object, a plant and the grasp law, ready to run.
 //! - [`numeric`]: derivatives by differences, and the largest of many errors.
-//! - [`polyhedra`]: random convex polyhedra, and scenes in which the hand grasps them.
+//! - [`polyhedra`]: random convex polyhedra, and meshes of them with noise.
+//! - [`study`]: many objects, placed in the hand and grasped.
 //! - [`supervised`]: a simulated hand whose controller is watched, with things that go wrong.
 //! - [`thumb`]: what the functions of an image for the microcontroller call, and how much stack they take.
 //! - [`urdf`]: random URDFs, and their kinematics and dynamics link by link.
@@ -29,6 +30,7 @@ pub mod images;
 pub mod numeric;
 pub mod polyhedra;
 pub mod random;
+pub mod study;
 pub mod supervised;
 pub mod thumb;
 pub mod urdf;

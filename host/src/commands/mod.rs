@@ -12,6 +12,7 @@ mod ports;
 pub(crate) mod record;
 mod recording;
 pub(crate) mod replay;
+pub(crate) mod scene;
 #[cfg(unix)]
 pub(crate) mod serve;
 pub(crate) mod sim;

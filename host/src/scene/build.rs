@@ -1,30 +1,36 @@
 //! From the effective configuration to a [`Scene`]: every number checked, everything prepared.
 
 use super::{
-    Scene,
+    Parts, Scene,
     check::{Result, all_within, fail, name, schema, within},
     file::{Control, SceneFile},
     hand::{fingertip_parameters, hand, joint_parameters, moving_masses, overlaps},
     object::object,
-    start::{attitude, start},
+    start::start,
 };
 use nalgebra::Vector3;
 
 /// Longer runs are likely mistakes, s.
 const LONGEST_RUN_S: f64 = 3600.0;
 
-/// Checks a configuration and prepares the scene.
-pub(super) fn scene(file: SceneFile) -> Result<Scene> {
+/// Checks what is known before hand and object meet.
+pub(super) fn parts(file: &SceneFile) -> Result<Parts> {
     let mut warnings = Vec::new();
     for (key, word) in
         [("name", &file.name), ("hand.name", &file.hand.name), ("object.name", &file.object.name)]
     {
         name(key, word)?;
     }
-    let substeps = settings(&file)?;
+    let substeps = settings(file)?;
     let hand = hand(&file.hand, &mut warnings)?;
     let object = object(&file.object, &mut warnings)?;
-    let attitude = attitude(&file.pose)?;
+    Ok(Parts { hand, object, substeps, warnings })
+}
+
+/// Checks a configuration and prepares the scene.
+pub(super) fn scene(file: SceneFile) -> Result<Scene> {
+    let Parts { hand, object, substeps, mut warnings } = parts(&file)?;
+    let attitude = file.pose.attitude()?;
     all_within("pose.position_m", &file.pose.position_m, 100.0)?;
     let position_m = Vector3::from(file.pose.position_m);
 

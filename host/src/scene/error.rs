@@ -53,7 +53,7 @@ pub struct SceneError {
 
 impl SceneError {
     /// An error about a key whose place is still to be found.
-    pub(super) fn new(key: impl Into<String>, problem: impl Into<String>, remedy: impl Into<String>) -> Self {
+    pub(crate) fn new(key: impl Into<String>, problem: impl Into<String>, remedy: impl Into<String>) -> Self {
         Self { place: None, key: key.into(), problem: problem.into(), remedy: remedy.into() }
     }
 

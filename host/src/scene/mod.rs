@@ -12,14 +12,15 @@ mod build;
 mod check;
 mod controller;
 mod draft;
+mod equilibrium;
 mod error;
 pub mod file;
 mod hand;
 mod hand_model;
+pub mod inverse_kinematics;
 mod library;
 pub mod mesh;
 mod object;
-pub mod placement;
 mod read;
 mod source;
 mod start;
@@ -42,6 +43,7 @@ use std::path::Path;
 use tree::Node;
 
 pub use draft::Draft;
+pub use equilibrium::equilibrium_indentations;
 pub(crate) use error::one_line;
 pub use error::{Notice, Place, SceneError, suggestion};
 pub use file::{Actuators, Control, Friction, HandFile, ObjectFile, PlantSettings, SceneFile, Sensors};
@@ -99,6 +101,29 @@ pub struct Scene {
     pub warnings: Vec<String>,
     /// The effective configuration.
     pub file: SceneFile,
+}
+
+/// What is known of a scene before hand and object meet, checked and prepared.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Parts {
+    /// Kinematics and link masses of the hand.
+    pub hand: Hand,
+    /// The object.
+    pub object: ObjectBody,
+    /// How many steps of the integrator make one control period.
+    pub substeps: usize,
+    /// What is odd but can be simulated, in words.
+    pub warnings: Vec<String>,
+}
+
+impl Parts {
+    /// Of a configuration whose pose and contacts are still to be found.
+    ///
+    /// # Errors
+    /// One line: which key, what is wrong, what to do.
+    pub fn of(file: &SceneFile) -> Result<Self, SceneError> {
+        build::parts(file)
+    }
 }
 
 /// What the simulator needs to know of a joint besides the [`Hand`]. Torque limit and friction are those that the
@@ -269,6 +294,20 @@ impl ObjectFile {
     /// As [`Self::load`].
     pub fn load_with_notices(name_or_path: &str) -> Result<(Self, Vec<Notice>), SceneError> {
         Self::load_with_places(name_or_path).map(|(file, places)| (file, places.notices))
+    }
+
+    /// Loads an object and checks its numbers; with what is odd in it, in words.
+    ///
+    /// # Errors
+    /// One line: where, which key, what is wrong, what to do.
+    pub fn load_checked(name_or_path: &str) -> Result<(Self, Vec<String>), SceneError> {
+        let (file, places) = Self::load_with_places(name_or_path)?;
+        let mut warnings: Vec<String> = places.notices.iter().map(Notice::to_string).collect();
+        file.body(&mut warnings).map_err(|error| {
+            let place = places.of(&error.key);
+            error.at(&place)
+        })?;
+        Ok((file, warnings))
     }
 
     /// The same, with where its values come from.

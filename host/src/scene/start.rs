@@ -3,10 +3,11 @@
 use super::{
     Start,
     check::{Result, all_within, fail, item, within},
+    equilibrium::equilibrium_indentations,
     error::{SceneError, suggestion},
-    file::{Indentation, PoseFile, SceneFile},
+    file::{Indentation, JointFile, PoseFile, SceneFile},
     hand::{posture, rotation},
-    placement,
+    inverse_kinematics,
 };
 use crate::Hand;
 use crate::plant::contact::FaceContact;
@@ -19,27 +20,29 @@ const OFF_FACE_M: f64 = 1e-6;
 /// Room that a fingertip needs from parts of the object beside its face, m: what the search for the posture leaves open.
 const CLEAR_M: f64 = 1e-9;
 
-/// The attitude of a pose.
-pub(super) fn attitude(pose: &PoseFile) -> Result<UnitQuaternion<f64>> {
-    match (pose.rotation_rpy_rad, pose.quaternion_wxyz) {
-        (Some(_), Some(_)) => {
-            fail("pose.quaternion_wxyz", "angles and quaternion are both given", "leave one out")
-        }
-        (None, Some([w, x, y, z])) => {
-            let quaternion = Quaternion::new(w, x, y, z);
-            if !((quaternion.norm() - 1.0).abs() < 1e-3) {
-                return fail(
-                    "pose.quaternion_wxyz",
-                    format!("has length {}", quaternion.norm()),
-                    "divide it by its length",
-                );
+impl PoseFile {
+    /// The attitude, checked.
+    pub(crate) fn attitude(&self) -> Result<UnitQuaternion<f64>> {
+        match (self.rotation_rpy_rad, self.quaternion_wxyz) {
+            (Some(_), Some(_)) => {
+                fail("pose.quaternion_wxyz", "angles and quaternion are both given", "leave one out")
             }
-            Ok(UnitQuaternion::new_normalize(quaternion))
-        }
-        (angles, None) => {
-            let angles = angles.unwrap_or_default();
-            all_within("pose.rotation_rpy_rad", &angles, 100.0)?;
-            Ok(rotation(angles))
+            (None, Some([w, x, y, z])) => {
+                let quaternion = Quaternion::new(w, x, y, z);
+                if !((quaternion.norm() - 1.0).abs() < 1e-3) {
+                    return fail(
+                        "pose.quaternion_wxyz",
+                        format!("has length {}", quaternion.norm()),
+                        "divide it by its length",
+                    );
+                }
+                Ok(UnitQuaternion::new_normalize(quaternion))
+            }
+            (angles, None) => {
+                let angles = angles.unwrap_or_default();
+                all_within("pose.rotation_rpy_rad", &angles, 100.0)?;
+                Ok(rotation(angles))
+            }
         }
     }
 }
@@ -53,6 +56,41 @@ fn contact_frame(outward_normal: &Vector3<f64>) -> Matrix3<f64> {
     Matrix3::from_columns(&[c_y.cross(&c_z), c_y, c_z])
 }
 
+impl SceneFile {
+    /// The angles that the inverse kinematics starts from and stays near, rad; those of joints that move several fingertips
+    /// it keeps.
+    ///
+    /// # Errors
+    /// An angle for a joint that is none of these, or that it can't have.
+    pub(crate) fn nominal_rad(&self, hand: &Hand) -> Result<Vec<f64>> {
+        for name in self.start.trunk_rad.keys() {
+            let key = format!("start.trunk_rad.{name}");
+            let trunk = |k: &usize| inverse_kinematics::is_trunk(hand, *k);
+            match self.hand.joints.iter().position(|joint| joint.name == *name) {
+                Some(k) if trunk(&k) => {
+                    let (lower, upper) = hand.range_rad(k);
+                    within(&key, self.start.trunk_rad[name], lower, upper)?;
+                }
+                Some(_) => {
+                    return fail(
+                        key,
+                        "this joint moves one fingertip: the inverse kinematics finds its angle",
+                        "leave it out",
+                    );
+                }
+                None => {
+                    let known =
+                        (0..hand.joint_count()).filter(trunk).map(|k| self.hand.joints[k].name.as_str());
+                    return fail(key, format!("there is no joint `{name}`"), suggestion(name, known));
+                }
+            }
+        }
+        let nominal =
+            |joint: &JointFile| self.start.trunk_rad.get(&joint.name).copied().unwrap_or(joint.nominal_rad);
+        Ok(self.hand.joints.iter().map(nominal).collect())
+    }
+}
+
 /// Faces, contact points, joint angles and indentations at the start.
 pub(super) fn start(
     file: &SceneFile,
@@ -61,27 +99,7 @@ pub(super) fn start(
     position_m: Vector3<f64>,
     attitude: UnitQuaternion<f64>,
 ) -> Result<(Vec<FaceContact>, Start)> {
-    for name in file.start.trunk_rad.keys() {
-        let key = format!("start.trunk_rad.{name}");
-        let trunk = |k: &usize| placement::is_trunk(hand, *k);
-        match file.hand.joints.iter().position(|joint| joint.name == *name) {
-            Some(k) if trunk(&k) => {
-                let (lower, upper) = hand.range_rad(k);
-                within(&key, file.start.trunk_rad[name], lower, upper)?;
-            }
-            Some(_) => {
-                return fail(
-                    key,
-                    "this joint moves one fingertip: the inverse kinematics finds its angle",
-                    "leave it out",
-                );
-            }
-            None => {
-                let known = (0..hand.joint_count()).filter(trunk).map(|k| file.hand.joints[k].name.as_str());
-                return fail(key, format!("there is no joint `{name}`"), suggestion(name, known));
-            }
-        }
-    }
+    let nominal_rad = file.nominal_rad(hand)?;
     let mut contacts = touches(file, shape)?;
     let radii: Vec<f64> = file.hand.fingertips.iter().map(|fingertip| fingertip.radius_m).collect();
 
@@ -102,8 +120,8 @@ pub(super) fn start(
         Indentation::Equilibrium => {
             let stiffnesses: Vec<f64> =
                 file.hand.fingertips.iter().map(|fingertip| fingertip.stiffness_n_m2).collect();
-            placement::equilibrium_indentations(&points, &inwards, &radii, &stiffnesses, file.control.force_n)
-                .or_else(|i| {
+            equilibrium_indentations(&points, &inwards, &radii, &stiffnesses, file.control.force_n).or_else(
+                |i| {
                     fail(
                         format!("contact.{}", i + 1),
                         format!(
@@ -112,7 +130,8 @@ pub(super) fn start(
                         ),
                         "choose faces that look away from the middle of the fingertips",
                     )
-                })?
+                },
+            )?
         }
     };
     for (i, &indentation) in indentations_m.iter().enumerate() {
@@ -129,13 +148,7 @@ pub(super) fn start(
     let targets: Vec<Vector3<f64>> = (0..points.len())
         .map(|i| position_m + attitude * (points[i] - inwards[i] * (radii[i] - indentations_m[i])))
         .collect();
-    let nominal: Vec<f64> = file
-        .hand
-        .joints
-        .iter()
-        .map(|joint| file.start.trunk_rad.get(&joint.name).copied().unwrap_or(joint.nominal_rad))
-        .collect();
-    let angles_rad = placement::place(hand, &targets, &nominal).map_err(|miss| {
+    let angles_rad = inverse_kinematics::place(hand, &targets, &nominal_rad).map_err(|miss| {
         let limit = match miss.limited_by {
             Some(k) => format!(", with joint `{}` at its limit", file.hand.joints[k].name),
             None => String::new(),

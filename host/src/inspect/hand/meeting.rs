@@ -7,7 +7,7 @@
 
 use super::reach::{Angles, Sense, random_angles, sweep};
 use super::specimen::Specimen;
-use crate::scene::{placement, posture};
+use crate::scene::{inverse_kinematics, posture};
 use nalgebra::Vector3;
 
 /// Starts for a ball and a set of fingertips: the nominal posture, and random ones.
@@ -132,7 +132,7 @@ fn is_confirmed(
             all[i] = *target;
         }
     }
-    placement::place(hand, &all, &angles[..hand.joint_count()]).is_ok()
+    inverse_kinematics::place(hand, &all, &angles[..hand.joint_count()]).is_ok()
 }
 
 #[cfg(test)]

@@ -1,7 +1,7 @@
 //! The hand under inspection, as the rules see it.
 
 use crate::inspect::finding::{Finding, Severity};
-use crate::scene::placement::is_trunk;
+use crate::scene::inverse_kinematics::is_trunk;
 use crate::scene::{HandFile, posture};
 use crate::{Hand, MAX_JOINTS, Posture};
 use nalgebra::Vector3;

@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ObjectFile {
-    /// Version of the format; [`SCHEMA`].
+    /// Version of the format; [`SCHEMA`](super::SCHEMA).
     pub schema: u32,
     /// A word.
     pub name: String,

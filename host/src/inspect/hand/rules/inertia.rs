@@ -14,6 +14,8 @@ use std::f64::consts::PI;
 const DENSEST_KG_M3: f64 = 1000.0;
 /// How many times beyond everything on its link a mass may be. A palm is wider than the joints on it are apart.
 const BEYOND: f64 = 2.0;
+/// A link below this, kg and kg m^2, is one without mass: URDFs have such numbers because loaders refuse zeros.
+const NOTHING: f64 = 1e-12;
 /// A body of this share of its link's size is none.
 const POINT: f64 = 0.01;
 
@@ -65,6 +67,9 @@ fn inertia(specimen: &Specimen, k: usize, found: &mut Found) {
     let link = specimen.hand.link(k);
     let moments = SymmetricEigen::new(link.inertia_kg_m2).eigenvalues;
     let (least, most) = (moments.min(), moments.max());
+    if link.mass_kg < NOTHING && most.abs() < NOTHING {
+        return;
+    }
     let mut tell = |severity, what: String, remedy: &str| {
         found.push(specimen.on_joint(severity, (k, "inertia_kg_m2"), what, remedy));
     };

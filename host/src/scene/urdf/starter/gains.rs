@@ -111,11 +111,11 @@ impl Gains {
     pub(super) fn new(draft: &Draft<'_>, file: &HandFile, hand: &Hand) -> Result<Self> {
         let angles: Vec<f64> = draft.needs.iter().map(|needs| needs.nominal_rad).collect();
         moving_masses(file, hand, &angles).map_err(|error| {
-            let named =
-                file.joints.iter().position(|joint| error.problem.contains(&format!("`{}`", joint.name)));
-            let joint = draft.joint(named.unwrap_or(0));
+            // The key has the joint's number, from 1: `hand.joint.2.mass_kg`.
+            let number = error.key.split('.').nth(2).and_then(|word| word.parse::<usize>().ok());
+            let index = number.and_then(|number| number.checked_sub(1)).unwrap_or(0);
             let remedy = "give the links that it moves an <inertial> in the URDF";
-            SceneError::new("", error.problem, remedy).at(&joint.place)
+            SceneError::new("", error.problem, remedy).at(&draft.joint(index).place)
         })?;
         let measures = Measures::new(draft, file, hand, &angles);
         let count = file.joints.len();

@@ -51,7 +51,10 @@ impl Needs {
             _ => None,
         };
         let [lower, upper] = limits_rad.unwrap_or([limit.lower.unwrap_or(0.0), limit.upper.unwrap_or(0.0)]);
-        let nominal_rad = gains::rounded(0.5 * (lower + upper));
+        let middle = 0.5 * (lower + upper);
+        // A small range far from zero may lie between two round numbers.
+        let nominal_rad =
+            Some(gains::rounded(middle)).filter(|angle| (lower..=upper).contains(angle)).unwrap_or(middle);
         Self { torque, speed, friction: !has_friction(joint), limits_rad, nominal_rad }
     }
 }

@@ -193,6 +193,14 @@ fn what_is_asked_for_is_taken() {
     assert!(starter.guesses.iter().all(|guess| !guess.contains("left-2")), "{:?}", starter.guesses);
 }
 
+/// Half of 1.2341 and 1.2345 has more than two digits.
+#[test]
+fn nominal_angles_are_within_small_limits() {
+    let urdf = changed(GRIPPER, "lower=\"-0.8\" upper=\"1.4\"", "lower=\"1.2341\" upper=\"1.2345\"");
+    let (folder, starter) = start(&urdf, |_| ()).unwrap();
+    assert!((read(&folder, &starter).joints[0].nominal_rad - 1.2343).abs() < 1e-12);
+}
+
 /// Joints that move nothing that matters are held still in words.
 #[test]
 fn idle_joints_are_held_still() {

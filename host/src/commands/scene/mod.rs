@@ -1,0 +1,27 @@
+//! `blindgrasp scene`: scenes as files.
+
+mod new;
+mod show;
+
+use super::Outcome;
+use clap::{Args, Subcommand};
+
+/// Scenes: place an object in a hand, and write a scene file of it
+#[derive(Args)]
+#[command(arg_required_else_help = true)]
+pub(crate) struct Arguments {
+    #[command(subcommand)]
+    action: Action,
+}
+
+#[derive(Subcommand)]
+enum Action {
+    New(new::Arguments),
+}
+
+/// Runs the command.
+pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
+    match &arguments.action {
+        Action::New(arguments) => new::run(arguments),
+    }
+}

@@ -1,0 +1,171 @@
+//! Many objects, placed in the paper's hand and grasped in the paper's own model, with `u_st` and without, and once more with
+//! the encoders, the delay, the limits and the friction of the hand.
+
+use blindgrasp::placement::{NoPlacement, Placement, Reach, Request, place};
+use blindgrasp::scene::file::{ObjectFile, SceneFile, ShapeFile};
+use blindgrasp::scene::{Parts, Scene};
+use blindgrasp::sim::Simulation;
+use blindgrasp::sim::summary::Summary;
+use std::sync::Mutex;
+use std::thread;
+use std::time::Instant;
+
+/// Long enough for a grasp that is going to be lost to be lost, mostly: the cube without `u_st` takes 2.2 s.
+const DURATION: &str = "duration_s=5.0";
+/// Styrene foam, like the paper's objects (2.1 g in a cube of 48 mm), kg/m^3.
+pub const DENSITY_KG_M3: f64 = 19.0;
+
+/// An object of the study.
+#[derive(Clone, Debug)]
+pub struct Specimen {
+    /// The object.
+    pub object: ObjectFile,
+    /// How many faces it has.
+    pub faces: usize,
+    /// Largest distance between two corners, m.
+    pub extent_m: f64,
+}
+
+/// What became of it.
+#[derive(Clone, Debug)]
+pub struct Outcome {
+    /// The placement, or why there is none.
+    pub placed: Result<Box<Placement>, String>,
+    /// How long the search took, s.
+    pub search_s: f64,
+    /// What the grasp came to.
+    pub runs: Option<Runs>,
+}
+
+/// What a grasp came to.
+#[derive(Clone, Debug)]
+pub struct Runs {
+    /// In the paper's model.
+    pub with: Summary,
+    /// In the paper's model, without `u_st`.
+    pub without: Summary,
+    /// With encoders, delay, limits and friction; none if the posture for the first touch can't be taken.
+    pub real: Option<Summary>,
+}
+
+/// The hand of the study, with all that does not depend on the object.
+pub struct Study {
+    like: SceneFile,
+    /// The same hand with encoders, delay, limits and friction.
+    real: SceneFile,
+    reach: Reach,
+}
+
+impl Default for Study {
+    /// The paper's hand in the paper's model.
+    fn default() -> Self {
+        let mut like = Scene::load("cube-ideal", &[DURATION.to_owned()]).expect("built in").file;
+        like.contacts.clear();
+        let parts = Parts::of(&like).expect("a built-in scene");
+        let reach = Reach::of_scene(&like, &parts).expect("a built-in scene");
+        let real = Scene::load("cube", &[DURATION.to_owned()]).expect("built in").file;
+        Self { like, real, reach }
+    }
+}
+
+impl Study {
+    /// A convex hull as an object.
+    pub fn hull(&self, points_m: Vec<[f64; 3]>) -> ObjectFile {
+        ObjectFile {
+            name: "polyhedron".to_owned(),
+            mass_kg: None,
+            density_kg_m3: Some(DENSITY_KG_M3),
+            shape: ShapeFile::Hull { points_m },
+            ..self.like.object.clone()
+        }
+    }
+
+    /// The best placements of an object in the attitude in which it is described.
+    ///
+    /// # Errors
+    /// Why there is none.
+    ///
+    /// # Panics
+    /// If the object is none.
+    pub fn place(&self, object: ObjectFile, most: usize) -> Result<Vec<Placement>, NoPlacement> {
+        let like = SceneFile { object, ..self.like.clone() };
+        let parts = Parts::of(&like).expect("an object");
+        let request = Request {
+            like: &like,
+            parts: &parts,
+            reach: &self.reach,
+            any_position: true,
+            any_attitude: false,
+        };
+        place(&request, most)
+    }
+
+    /// Places an object and runs its grasp.
+    fn run(&self, specimen: &Specimen) -> Outcome {
+        let begun = Instant::now();
+        let placed = self.place(specimen.object.clone(), 1);
+        let search_s = begun.elapsed().as_secs_f64();
+        let placed = placed.map(|mut all| Box::new(all.swap_remove(0))).map_err(|none| none.to_string());
+        let runs = placed.as_ref().ok().map(|placement| {
+            let file = &placement.scene.file;
+            let mut without = file.clone();
+            without.control.attitude_stiffness_nm = 0.0;
+            let real = SceneFile {
+                object: file.object.clone(),
+                pose: file.pose.clone(),
+                contacts: file.contacts.clone(),
+                ..self.real.clone()
+            };
+            Runs {
+                with: simulate(&placement.scene),
+                without: simulate(&Scene::build(without).expect("the same scene")),
+                real: Scene::build(real).ok().map(|scene| simulate(&scene)),
+            }
+        });
+        Outcome { placed, search_s, runs }
+    }
+
+    /// All specimens, on all processors, in their order.
+    pub fn run_all(&self, specimens: &[Specimen]) -> Vec<Outcome> {
+        spread(specimens, |specimen| self.run(specimen))
+    }
+}
+
+/// Does something with each of many things, on all processors; the results in their order.
+///
+/// # Panics
+/// If one of them does.
+pub fn spread<T: Sync, R: Send>(things: &[T], work: impl Fn(&T) -> R + Sync) -> Vec<R> {
+    let results = Mutex::new(Vec::new());
+    let next = Mutex::new(things.iter().enumerate());
+    thread::scope(|scope| {
+        for _ in 0..thread::available_parallelism().map_or(1, usize::from) {
+            scope.spawn(|| {
+                loop {
+                    let Some((k, thing)) = next.lock().unwrap_or_else(|p| p.into_inner()).next() else {
+                        break;
+                    };
+                    let result = work(thing);
+                    results.lock().unwrap_or_else(|p| p.into_inner()).push((k, result));
+                }
+            });
+        }
+    });
+    let mut results = results.into_inner().unwrap_or_else(|p| p.into_inner());
+    results.sort_by_key(|(k, _)| *k);
+    results.into_iter().map(|(_, result)| result).collect()
+}
+
+/// Runs a scene.
+///
+/// # Panics
+/// If something is not a number.
+pub fn simulate(scene: &Scene) -> Summary {
+    let run = Simulation::new(scene).expect("a scene that was built can be simulated").run(|_| {});
+    for sample in &run.samples {
+        let values = sample.speeds_rad_s.iter().chain(sample.position_m.iter()).chain([&sample.energy_j]);
+        assert!(values.into_iter().all(|v| v.is_finite()), "not finite at {} s", sample.t_s);
+        assert!(sample.contacts.iter().all(|contact| contact.normal_force_n.is_finite()));
+    }
+    run.summary
+}
