@@ -29,7 +29,7 @@ import tempfile
 import time
 import zlib
 
-INTERFACE_VERSION = 3
+INTERFACE_VERSION = 4
 HEARTBEAT_S = 0.05  # a fifth of the 250 ms after which a hand lets go
 PATIENCE_S = 1.0  # an answer takes a few ms
 WAITING_MOST = 5  # requests that wait for their answers; the hand holds 7
@@ -343,11 +343,13 @@ REFUSALS = {
 PARAMETERS = {
     "Force": "force_n",
     "AttitudeStiffness": "attitude_stiffness_nm",
+    "IntegralGain": "integral_gain_nm_rad",
     "Damping": "damping_nm_s",
     "Gravity": "gravity_m_s2",
     "EstimatorBandwidth": "estimator.bandwidth_hz",
     "ForceLimit": "limits.force_n",
     "StiffnessLimit": "limits.attitude_stiffness_nm",
+    "IntegralLimit": "limits.integral_gain_nm_rad",
     "TorqueLimit": "limits.torque_nm",
     "SlewLimit": "limits.slew_nm_s",
     "StopMargin": "limits.stops.margin_rad",
@@ -379,7 +381,7 @@ FAULT = Struct(fault=Known(FAULTS), joint=Option(BYTE))
 COMMAND = Enum(
     Arm=None,
     Disarm=None,
-    Grasp=Struct(force_n=Option(F32), attitude_stiffness_nm=Option(F32)),
+    Grasp=Struct(force_n=Option(F32), attitude_stiffness_nm=Option(F32), integral_gain_nm_rad=Option(F32)),
     Release=None,
     Stop=None,
     ClearFault=None,
@@ -408,9 +410,13 @@ RECORD = Struct(
     reading_failed=Option(FAULT),
     force_n=F32,
     attitude_stiffness_nm=F32,
+    integral_gain_nm_rad=F32,
     approach_potential_j=F32,
     attitude_potential_j=F32,
-    energy_j=F32,
+    integral_potential_j=F32,
+    work_j=F32,
+    damped_j=F32,
+    excess_j=F32,
     cycles=U32,
     late_ticks=U32,
     dropped=U32,
@@ -479,7 +485,33 @@ class Unusable(Exception):
 
 DENSE_TAG = 6
 WINDOW = 8  # a dense record can be read after any of so many before it
-MONITORS = ["force_n", "attitude_stiffness_nm", "approach_potential_j", "attitude_potential_j", "energy_j"]
+# Law and ledger.
+MONITORS = [
+    "force_n",
+    "attitude_stiffness_nm",
+    "integral_gain_nm_rad",
+    "approach_potential_j",
+    "attitude_potential_j",
+    "integral_potential_j",
+    "work_j",
+    "damped_j",
+    "excess_j",
+]
+# Of each, the bit that says that it follows: stiffness and integral gain share one.
+FOLLOWS = [1, 2, 2, 4, 8, 16, 32, 64, 128]
+
+
+def half_bits(value):
+    """The bits of a number as a binary16."""
+    try:
+        return int.from_bytes(struct.pack("<e", value), "little")
+    except OverflowError:
+        return 0x7C00 if value > 0 else 0xFC00
+
+
+def rounded(value):
+    """A number as a binary16 has it."""
+    return struct.unpack("<e", half_bits(value).to_bytes(2, "little"))[0]
 
 
 def mix(words):
@@ -550,6 +582,10 @@ class Replies:
         if not 1 <= passed <= WINDOW or tick != whole_tick % 2**16 or far:
             self.lost = True
             raise Unusable("Lost")
+        follow = BYTE.read(body)
+        monitors = {
+            name: half.read(body) if follow & bit else rounded(last[name]) for name, bit in zip(MONITORS, FOLLOWS)
+        }
         record = {
             "sequence": sequence,
             "tick": whole_tick,
@@ -558,7 +594,7 @@ class Replies:
             "answer": None,
             "events": events,
             "reading_failed": None,
-            **{name: half.read(body) for name in MONITORS},
+            **monitors,
             "cycles": 4 * cycles,
             "late_ticks": not_below(last["late_ticks"], late & 15, 4),
             "dropped": not_below(last["dropped"], late >> 4, 4),
@@ -583,7 +619,8 @@ class Replies:
         if body.at < len(body.data):
             raise Malformed("there are bytes after the record")
         numbers = [record[part] for part in ("sequence", "tick", "late_ticks", "dropped", "decimation")]
-        if mix(numbers + record["counts"]) >> 24 != check:
+        law = [half_bits(value) for value in monitors.values()]
+        if mix(numbers + law + record["counts"]) >> 24 != check:
             self.lost = True
             raise Unusable("Lost")
         self.take(record)
@@ -918,9 +955,9 @@ def run_pil(session, args, out):
     if image["joint_count"] != args.joints:
         raise Trouble(f"the hand `{image['hand']}` has {image['joint_count']} joints: tell so with --joints")
     period_s = image["period_us"] * 1e-6
-    firmness = {"force_n": args.force, "attitude_stiffness_nm": None}
+    gains = {"force_n": args.force, "attitude_stiffness_nm": None, "integral_gain_nm_rad": None}
     at = {part: round(args.ticks * share) for part, share in [("grasp", 0.1), ("release", 0.5), ("end", 0.95)]}
-    script = {3: "Arm", at["grasp"]: {"Grasp": firmness}, at["release"]: "Release"}
+    script = {3: "Arm", at["grasp"]: {"Grasp": gains}, at["release"]: "Release"}
     script[at["end"]] = "Disarm"
     modes, largest_nm = [], {mode: 0.0 for mode in MODES}
     for tick in range(args.ticks):
@@ -1008,7 +1045,8 @@ def run_grasp(session, args):
     session.telemetry(args.decimation, args.signals)
     try:
         session.command("Arm")
-        session.command({"Grasp": {"force_n": args.force, "attitude_stiffness_nm": args.stiffness}})
+        gains = {"attitude_stiffness_nm": args.stiffness, "integral_gain_nm_rad": args.integral}
+        session.command({"Grasp": {"force_n": args.force, **gains}})
         if session.pump(args.hold, lambda: state() == "Fault"):
             raise Trouble(told_fault(session.last_record["fault"]))
         session.command("Release")
@@ -1163,6 +1201,7 @@ def arguments():
     grasp = command("grasp", "arm, grasp, hold, release, disarm", True)
     grasp.add_argument("--force", type=finite, help="N; as configured if left out")
     grasp.add_argument("--stiffness", type=finite, help="of the relative attitudes, N m; as configured if left out")
+    grasp.add_argument("--integral", type=finite, help="gain of the earlier law, N m/rad; as configured if left out")
     grasp.add_argument("--hold", type=finite, default=5.0, help="seconds")
     pil = command("pil", "be the joints of the image `pil`: springs with dampers, in lockstep")
     pil.add_argument("--image", help="start this image in QEMU, instead of --port")

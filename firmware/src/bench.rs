@@ -13,7 +13,7 @@ use crate::link::MOST_SENT;
 use crate::model::{FINGERS, JOINTS, params};
 use crate::semihosting::File;
 use blindgrasp_shared::command::{Command, Grasp};
-use blindgrasp_shared::control::{GraspConfig, Grip, Latch};
+use blindgrasp_shared::control::{GraspConfig, Latch};
 use blindgrasp_shared::device::Reading;
 use blindgrasp_shared::fault::Raised;
 use blindgrasp_shared::hand::Posture;
@@ -145,7 +145,7 @@ fn law(
     let mut joints = Swinging { params, tick: 0 };
     let mut posture = Posture::at_base();
     hand.forward_kinematics(&joints.angles_rad(), &mut posture);
-    let latch = Latch::of(&posture);
+    let latch = Latch::of(&posture, &joints.angles_rad());
     let speeds_rad_s = [0.3; JOINTS];
     let mut most = 0;
     for tick in 0..TICKS {
@@ -153,12 +153,8 @@ fn law(
         let angles_rad = joints.angles_rad();
         most = most.max(counter.instructions(|| {
             hand.forward_kinematics(black_box(&angles_rad), &mut posture);
-            let grip = Grip {
-                latch: &latch,
-                force_n: config.force_n,
-                attitude_stiffness_nm: config.attitude_stiffness_nm,
-            };
-            black_box(law.torques(hand, &posture, black_box(&speeds_rad_s), Some(grip)));
+            let grip = law.grip(&latch);
+            black_box(law.torques(hand, &posture, &angles_rad, black_box(&speeds_rad_s), Some(grip)));
         }));
     }
     Ok(most)

@@ -37,6 +37,7 @@ fn gains(scene: &Scene) -> GraspConfig<f32, J> {
     GraspConfig {
         force_n: scene.control.force_n as f32,
         attitude_stiffness_nm: scene.control.attitude_stiffness_nm as f32,
+        integral_gain_nm_rad: scene.control.integral_gain_nm_rad as f32,
         damping_nm_s: std::array::from_fn(|k| scene.joints[k].damping_gain_nm_s_rad as f32),
         gravity_m_s2: Some(Vector3::new(0.0, 0.0, -9.81)),
     }
@@ -52,14 +53,14 @@ fn controller(criterion: &mut Criterion) {
     let law = gains.prepare(&hand).expect("gains");
     let mut posture = PostureOf::at_base();
     hand.forward_kinematics(&angles, &mut posture);
-    let latch = Latch::of(&posture);
+    let latch = Latch::of(&posture, &angles);
     let speeds = [0.01; J];
     criterion.bench_function("forward kinematics (f32, 12 joints)", |bencher| {
         bencher.iter(|| hand.forward_kinematics(black_box(&angles), &mut posture));
     });
     criterion.bench_function("law with gravity (f32, 12 joints)", |bencher| {
         let grip = law.grip(&latch);
-        bencher.iter(|| law.torques(&hand, black_box(&posture), black_box(&speeds), Some(grip)));
+        bencher.iter(|| law.torques(&hand, black_box(&posture), &angles, black_box(&speeds), Some(grip)));
     });
 
     let per_turn = scene.joints[0].encoder_counts_per_turn;
@@ -152,9 +153,9 @@ fn plant(criterion: &mut Criterion) {
     let law = sim::law(&scene).expect("gains");
     let mut posture = Posture::at_base();
     scene.hand.forward_kinematics(&angles, &mut posture);
-    let latch = Latch::of(&posture);
+    let latch = Latch::of(&posture, &angles);
     let grip = law.grip(&latch);
-    let (torques, _) = law.torques(&scene.hand, &posture, &[0.0; MAX_JOINTS], Some(grip));
+    let (torques, _) = law.torques(&scene.hand, &posture, &angles, &[0.0; MAX_JOINTS], Some(grip));
     let mut plant = begin();
     let mut steps = 0;
     criterion.bench_function("plant step (12 joints and cube)", |bencher| {

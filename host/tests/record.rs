@@ -6,6 +6,7 @@
 use blindgrasp::record::mcap::{Decoded, Decoder, Recording, Stamp, What};
 use blindgrasp_shared::fault::Fault;
 use blindgrasp_shared::link::message::Reply;
+use blindgrasp_shared::settings::Parameter;
 use blindgrasp_shared::supervisor::Mode;
 use blindgrasp_shared::telemetry::snapshot::Collector;
 use nix::sys::signal::{Signal, kill};
@@ -205,7 +206,7 @@ fn idle_hand(seconds: u32) -> [f64; 2] {
     assert_eq!((code, &report["whole"]), (Some(0), &Value::Bool(true)), "{said}\n{errors}");
     let [content] = &read(&out)[..] else { panic!("one device") };
     assert!(!content.damaged && content.gaps.is_empty());
-    assert_eq!((content.sessions, content.settings), (1, 24 + 2 + 11 * 9));
+    assert_eq!((content.sessions, content.settings), (1, Parameter::ALL.len() + 2 + 11 * 9));
     assert_whole(&content.records);
     assert_eq!(report["records"].as_u64(), Some(content.records.len() as u64));
     // Everything but the first moments, in which parameters are read.

@@ -30,16 +30,19 @@ pub struct Grasp {
     pub force_n: Option<f32>,
     /// Stiffness `K_st` of the relative attitudes, N m.
     pub attitude_stiffness_nm: Option<f32>,
+    /// Gain `K_I` of the earlier law's integral of each joint's velocity, N m/rad.
+    pub integral_gain_nm_rad: Option<f32>,
 }
 
 impl Grasp {
     /// As configured.
-    pub const CONFIGURED: Self = Self { force_n: None, attitude_stiffness_nm: None };
+    pub const CONFIGURED: Self =
+        Self { force_n: None, attitude_stiffness_nm: None, integral_gain_nm_rad: None };
 }
 
 impl Command {
     /// Bytes that suffice for every command.
-    pub const MOST_BYTES: usize = 1 + 2 * (1 + 4);
+    pub const MOST_BYTES: usize = 1 + 3 * (1 + 4);
 
     /// Every command.
     pub const ALL: [Self; 6] = [

@@ -195,6 +195,8 @@ pub struct Motion<T, const J: usize> {
     pub angles_rad: [T; J],
     /// Joint speeds `dq/dt`, rad/s.
     pub speeds_rad_s: [T; J],
+    /// By how much each joint turned in this tick, rad, as the counts themselves have it: not late, and in whole counts.
+    pub moved_rad: [T; J],
     /// By how many counts each encoder moved in this tick, up or down: a large number means that it miscounts.
     pub count_changes: [u32; J],
 }
@@ -202,12 +204,17 @@ pub struct Motion<T, const J: usize> {
 impl<T: Real, const J: usize> Motion<T, J> {
     /// At rest at zero.
     pub fn still() -> Self {
-        Self { angles_rad: [T::zero(); J], speeds_rad_s: [T::zero(); J], count_changes: [0; J] }
+        Self {
+            angles_rad: [T::zero(); J],
+            speeds_rad_s: [T::zero(); J],
+            moved_rad: [T::zero(); J],
+            count_changes: [0; J],
+        }
     }
 }
 
 impl<const J: usize> Motion<f32, J> {
-    /// Without the changes of the counts: they say something of their own tick only.
+    /// Without what has changed in the tick: that says something of its own tick only.
     pub(crate) fn save(&self, joints: usize, to: &mut Saver<'_>) -> Result<(), BufferTooSmall> {
         for (&angle_rad, &speed_rad_s) in self.angles_rad.iter().zip(&self.speeds_rad_s).take(joints) {
             to.f32(angle_rad)?;
@@ -240,7 +247,9 @@ impl<T: Real, const J: usize> Estimator<T, J> {
         let mut motion = Motion::still();
         for k in 0..self.joint_count.min(J) {
             let (scale, track) = (&self.scales[k], &mut tracks.tracks[k]);
-            motion.count_changes[k] = track.follow(self.keep, self.beta, counts[k]);
+            let moved = track.follow(self.keep, self.beta, counts[k]);
+            motion.moved_rad[k] = T::from_i32(moved) * scale.rad;
+            motion.count_changes[k] = moved.unsigned_abs();
             motion.angles_rad[k] =
                 (T::from_i32(track.count.wrapping_sub(scale.zero_count)) + track.ahead) * scale.rad;
             motion.speeds_rad_s[k] = track.speed * scale.rad_s;
@@ -266,9 +275,9 @@ impl<T: Real, const J: usize> Estimator<T, J> {
 }
 
 impl<T: Real> Track<T> {
-    /// One step of the filter; returns by how much the count changed. Everything is measured from the newest count, so
+    /// One step of the filter; returns by how many counts the joint moved. Everything is measured from the newest count, so
     /// that the residual is the prediction's lead with the opposite sign.
-    fn follow(&mut self, keep: T, beta: T, count: i32) -> u32 {
+    fn follow(&mut self, keep: T, beta: T, count: i32) -> i32 {
         let moved = count.wrapping_sub(self.count);
         self.count = count;
         let moved_counts = T::from_i32(moved);
@@ -283,7 +292,7 @@ impl<T: Real> Track<T> {
             self.ahead = self.play;
             self.speed = T::zero();
         }
-        moved.unsigned_abs()
+        moved
     }
 }
 

@@ -21,6 +21,7 @@ pub mod event;
 pub mod fault;
 pub mod hand;
 pub mod identity;
+pub mod ledger;
 pub mod limit;
 pub mod link;
 pub mod math;

@@ -104,6 +104,8 @@ pub struct LimitConfig<T, const J: usize> {
     pub force_n: Option<T>,
     /// Largest attitude stiffness that may be asked for, N m.
     pub attitude_stiffness_nm: Option<T>,
+    /// Largest gain of the joints' integral that may be asked for, N m/rad.
+    pub integral_gain_nm_rad: Option<T>,
     /// Largest torque of each joint, N m.
     pub torque_nm: Option<[T; J]>,
     /// Largest change of each joint's torque, N m/s.
@@ -114,8 +116,14 @@ pub struct LimitConfig<T, const J: usize> {
 
 impl<T: Real, const J: usize> LimitConfig<T, J> {
     /// No limits.
-    pub const NONE: Self =
-        Self { force_n: None, attitude_stiffness_nm: None, torque_nm: None, slew_nm_s: None, stops: None };
+    pub const NONE: Self = Self {
+        force_n: None,
+        attitude_stiffness_nm: None,
+        integral_gain_nm_rad: None,
+        torque_nm: None,
+        slew_nm_s: None,
+        stops: None,
+    };
 }
 
 /// Soft end stops, as a user gives them.
@@ -134,6 +142,7 @@ pub struct StopConfig<T, const J: usize> {
 pub struct Limits<T, const J: usize> {
     force_n: Option<T>,
     attitude_stiffness_nm: Option<T>,
+    integral_gain_nm_rad: Option<T>,
     joint_count: usize,
     joints: [JointLimits<T>; J],
 }
@@ -170,9 +179,11 @@ impl<T: Real, const J: usize> LimitConfig<T, J> {
         hand: &Hand<T, J, F>,
         period: Period,
     ) -> Result<Limits<T, J>, ParameterError> {
-        for (limit, parameter) in
-            [(self.force_n, "limits.force_n"), (self.attitude_stiffness_nm, "limits.attitude_stiffness_nm")]
-        {
+        for (limit, parameter) in [
+            (self.force_n, "limits.force_n"),
+            (self.attitude_stiffness_nm, "limits.attitude_stiffness_nm"),
+            (self.integral_gain_nm_rad, "limits.integral_gain_nm_rad"),
+        ] {
             if limit.is_some_and(|limit| !(limit >= T::zero() && limit.is_finite())) {
                 return Err(ParameterError { parameter, joint: None, reason: "has to be zero or positive" });
             }
@@ -200,6 +211,7 @@ impl<T: Real, const J: usize> LimitConfig<T, J> {
         Ok(Limits {
             force_n: self.force_n,
             attitude_stiffness_nm: self.attitude_stiffness_nm,
+            integral_gain_nm_rad: self.integral_gain_nm_rad,
             joint_count,
             joints,
         })
@@ -231,6 +243,11 @@ impl<T: Real, const J: usize> StopConfig<T, J> {
     }
 }
 
+/// Whether a gain is none below zero, and at most the largest.
+fn allows<T: Real>(most: Option<T>, gain: T) -> bool {
+    gain >= T::zero() && gain.is_finite() && most.is_none_or(|most| gain <= most)
+}
+
 fn is_positive<T: Real>(v: T) -> bool {
     v > T::zero() && v.is_finite()
 }
@@ -238,14 +255,17 @@ fn is_positive<T: Real>(v: T) -> bool {
 impl<T: Real, const J: usize> Limits<T, J> {
     /// Whether a nominal grasping force may be asked for.
     pub fn allows_force(&self, force_n: T) -> bool {
-        force_n >= T::zero() && force_n.is_finite() && self.force_n.is_none_or(|most| force_n <= most)
+        allows(self.force_n, force_n)
     }
 
     /// Whether an attitude stiffness may be asked for.
     pub fn allows_attitude_stiffness(&self, stiffness_nm: T) -> bool {
-        stiffness_nm >= T::zero()
-            && stiffness_nm.is_finite()
-            && self.attitude_stiffness_nm.is_none_or(|most| stiffness_nm <= most)
+        allows(self.attitude_stiffness_nm, stiffness_nm)
+    }
+
+    /// Whether a gain of the joints' integral may be asked for.
+    pub fn allows_integral_gain(&self, gain_nm_rad: T) -> bool {
+        allows(self.integral_gain_nm_rad, gain_nm_rad)
     }
 
     /// Takes the wanted torques to the allowed ones, N m, and says what limited each joint.

@@ -55,11 +55,13 @@ macro_rules! parameters {
 parameters! {
     Force,               Hand,  "force_n",                        "Nominal grasping force, N";
     AttitudeStiffness,   Hand,  "attitude_stiffness_nm",          "Stiffness of the relative attitudes, N m";
+    IntegralGain,        Hand,  "integral_gain_nm_rad",           "Gain of the earlier law's integral of each joint's velocity, N m/rad";
     Damping,             Joint, "damping_nm_s",                   "Damping of a joint, N m s/rad";
     Gravity,             Axis,  "gravity_m_s2",                   "Gravity in the base frame, m/s^2";
     EstimatorBandwidth,  Hand,  "estimator.bandwidth_hz",         "Bandwidth of the estimator, Hz";
     ForceLimit,          Hand,  "limits.force_n",                 "Largest nominal grasping force, N";
     StiffnessLimit,      Hand,  "limits.attitude_stiffness_nm",   "Largest attitude stiffness, N m";
+    IntegralLimit,       Hand,  "limits.integral_gain_nm_rad",    "Largest gain of the integral, N m/rad";
     TorqueLimit,         Joint, "limits.torque_nm",               "Largest torque of a joint, N m";
     SlewLimit,           Joint, "limits.slew_nm_s",               "Largest change of a joint's torque, N m/s";
     StopMargin,          Joint, "limits.stops.margin_rad",        "Where a soft end stop begins before its end, rad";
@@ -74,7 +76,7 @@ parameters! {
     FrozenTime,          Hand,  "faults.frozen_ms",               "Shortest standstill that counts, ms";
     HeartbeatTime,       Hand,  "faults.heartbeat_ms",            "How long the heartbeat may fail, ms";
     LateTicks,           Hand,  "faults.late_ticks",              "How many ticks in a row may be late";
-    Energy,              Hand,  "faults.energy_j",                "Work that the joints may do in a second, J";
+    Energy,              Hand,  "faults.energy_j",                "Work in a second that the joints may do beyond the drop of the law's potentials, J";
     SoftStartTime,       Hand,  "supervisor.soft_start_ms",       "Time over which the force grows, ms";
     ReleaseTime,         Hand,  "supervisor.release_ms",          "Time over which force and stiffness fall, ms";
 }
@@ -167,6 +169,7 @@ impl<const J: usize> Config<f32, J> {
         match parameter {
             Parameter::Force
             | Parameter::AttitudeStiffness
+            | Parameter::IntegralGain
             | Parameter::Damping
             | Parameter::EstimatorBandwidth
             | Parameter::SoftStartTime
@@ -174,6 +177,7 @@ impl<const J: usize> Config<f32, J> {
             Parameter::Gravity => turn(&mut law.gravity_m_s2, on, Vector3::zeros()),
             Parameter::ForceLimit => turn(&mut limits.force_n, on, 0.0),
             Parameter::StiffnessLimit => turn(&mut limits.attitude_stiffness_nm, on, 0.0),
+            Parameter::IntegralLimit => turn(&mut limits.integral_gain_nm_rad, on, 0.0),
             Parameter::TorqueLimit => turn(&mut limits.torque_nm, on, zeros),
             Parameter::SlewLimit => turn(&mut limits.slew_nm_s, on, zeros),
             Parameter::StopMargin | Parameter::StopStiffness | Parameter::StopDamping => {
@@ -219,6 +223,7 @@ fn slot<const J: usize>(
     let slot = match parameter {
         Parameter::Force => Some(Slot::Real(&mut law.force_n)),
         Parameter::AttitudeStiffness => Some(Slot::Real(&mut law.attitude_stiffness_nm)),
+        Parameter::IntegralGain => Some(Slot::Real(&mut law.integral_gain_nm_rad)),
         Parameter::Damping => law.damping_nm_s.get_mut(k).map(Slot::Real),
         Parameter::Gravity => {
             law.gravity_m_s2.as_mut().and_then(|gravity| gravity.as_mut_slice().get_mut(k)).map(Slot::Real)
@@ -226,6 +231,7 @@ fn slot<const J: usize>(
         Parameter::EstimatorBandwidth => Some(Slot::Real(&mut estimator.bandwidth_hz)),
         Parameter::ForceLimit => limits.force_n.as_mut().map(Slot::Real),
         Parameter::StiffnessLimit => limits.attitude_stiffness_nm.as_mut().map(Slot::Real),
+        Parameter::IntegralLimit => limits.integral_gain_nm_rad.as_mut().map(Slot::Real),
         Parameter::TorqueLimit => joint(limits.torque_nm.as_mut(), k),
         Parameter::SlewLimit => joint(limits.slew_nm_s.as_mut(), k),
         Parameter::StopMargin => joint(limits.stops.as_mut().map(|stops| &mut stops.margin_rad), k),

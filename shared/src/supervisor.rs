@@ -3,8 +3,8 @@
 //! - **Disarmed**: no torque. The hand starts here.
 //! - **Armed**: the joints are damped and their weight is held.
 //! - **Grasping**: the grasp law. The fingertips' attitudes are latched in the first tick; the force `f_d` grows from
-//!   nothing over the soft start, the attitudes are held at full stiffness at once.
-//! - **Releasing**: force and attitude stiffness fall in proportion to zero over the release time; then armed.
+//!   nothing over the soft start, attitudes (and joints, where the law has `u_I`) are held at full stiffness at once.
+//! - **Releasing**: force and stiffness fall in proportion to zero over the release time; then armed.
 //! - **Fault**: no torque, until the fault is cleared.
 //!
 //! Where no torque is allowed there is none in the tick that enters the mode: no slew limit delays it.
@@ -126,7 +126,7 @@ pub fn outcome(mode: Mode, event: Event) -> Outcome {
 pub struct SupervisorConfig {
     /// Time over which the force grows, ms.
     pub soft_start_ms: u32,
-    /// Time over which force and attitude stiffness fall to zero, ms.
+    /// Time over which force and stiffness fall to zero, ms.
     pub release_ms: u32,
 }
 
@@ -184,8 +184,8 @@ pub enum Drive<T> {
     Grip {
         /// Share of `f_d`.
         force_share: T,
-        /// Share of `K_st`.
-        attitude_share: T,
+        /// Share of `K_st` and `K_I`.
+        stiffness_share: T,
     },
 }
 
@@ -282,11 +282,14 @@ impl Supervisor {
             Mode::Disarmed | Mode::Fault => Drive::Off,
             Mode::Armed => Drive::Hold,
             Mode::Grasping => {
-                Drive::Grip { force_share: ramps.soft_start.share(self.age), attitude_share: T::one() }
+                Drive::Grip { force_share: ramps.soft_start.share(self.age), stiffness_share: T::one() }
             }
             Mode::Releasing => {
                 let left = T::one() - ramps.release.share(self.age);
-                Drive::Grip { force_share: ramps.soft_start.share(self.grasped) * left, attitude_share: left }
+                Drive::Grip {
+                    force_share: ramps.soft_start.share(self.grasped) * left,
+                    stiffness_share: left,
+                }
             }
         }
     }
@@ -531,7 +534,7 @@ mod tests {
     /// Force and attitude shares of a tick.
     fn shares(supervisor: &Supervisor, ramps: &Ramps<f64>) -> (f64, f64) {
         match supervisor.drive(ramps) {
-            Drive::Grip { force_share, attitude_share } => (force_share, attitude_share),
+            Drive::Grip { force_share, stiffness_share } => (force_share, stiffness_share),
             drive => panic!("{drive:?}"),
         }
     }

@@ -2,8 +2,8 @@
 //!
 //! ```text
 //! counts --> estimate q, dq --> watch, supervise --> grasp law --> limit --> torques
-//!                                       |                                     |
-//!                                command, events                           Record --> telemetry
+//!                                       |                           |         |
+//!                                command, events                 ledger    Record --> telemetry
 //! ```
 //!
 //! It is pure: parameters, state, input, and nothing else. It cannot fail and does not panic; what goes wrong is a
@@ -11,19 +11,22 @@
 //!
 //! Torques are those of the tick's end: what is computed from the counts of this tick acts from the next.
 
-use crate::buffer::BufferTooSmall;
+mod state;
+
+pub use state::State;
+
 use crate::command::{Command, Grasp, Refusal};
-use crate::control::{GraspConfig, GraspLaw, Grip, Latch, Monitor};
-use crate::estimate::{Estimator, EstimatorConfig, Motion, Tracks};
+use crate::control::{Gains, GraspConfig, GraspLaw, Grip, Latch, Monitor};
+use crate::estimate::{Estimator, EstimatorConfig, Motion};
 use crate::event::{Event, Events};
-use crate::fault::{Fault, FaultConfig, Raised, Watch, Watched};
-use crate::hand::{Hand, Posture};
+use crate::fault::{Fault, FaultConfig, Raised, Watch};
+use crate::hand::Hand;
+use crate::ledger::{Doing, Entry};
 use crate::limit::{LimitConfig, Limiting, Limits};
 use crate::math::Real;
 use crate::parameter::ParameterError;
 use crate::period::Period;
-use crate::supervisor::{Drive, Mode, Ramps, Supervisor, SupervisorConfig};
-use crate::telemetry::snapshot::{Loader, Saver, SnapshotError};
+use crate::supervisor::{Drive, Mode, Ramps, SupervisorConfig};
 use crate::telemetry::{List, Record};
 
 /// Everything that can be set, in SI units.
@@ -55,6 +58,7 @@ pub struct Params<T, const J: usize, const F: usize> {
 struct Prepared<T, const J: usize> {
     config: Config<T, J>,
     period: Period,
+    period_s: T,
     estimator: Estimator<T, J>,
     law: GraspLaw<T, J>,
     limits: Limits<T, J>,
@@ -71,11 +75,15 @@ impl<T: Real, const J: usize> Prepared<T, J> {
         let limits = config.limits.prepare(hand, period)?;
         let law = config.law.prepare(hand)?;
         let fail = |parameter, reason| Err(ParameterError { parameter, joint: None, reason });
-        if !limits.allows_force(law.force_n()) {
+        let gains = law.gains();
+        if !limits.allows_force(gains.force_n) {
             return fail("force_n", "has to be at most limits.force_n");
         }
-        if !limits.allows_attitude_stiffness(law.attitude_stiffness_nm()) {
+        if !limits.allows_attitude_stiffness(gains.attitude_stiffness_nm) {
             return fail("attitude_stiffness_nm", "has to be at most limits.attitude_stiffness_nm");
+        }
+        if !limits.allows_integral_gain(gains.integral_gain_nm_rad) {
+            return fail("integral_gain_nm_rad", "has to be at most limits.integral_gain_nm_rad");
         }
         Ok(Self {
             law,
@@ -83,6 +91,7 @@ impl<T: Real, const J: usize> Prepared<T, J> {
             watch: config.faults.prepare(hand, &estimator, period)?,
             ramps: config.supervisor.prepare(period)?,
             period,
+            period_s: period.seconds(),
             estimator,
             config: *config,
         })
@@ -130,139 +139,6 @@ impl<T: Real, const J: usize, const F: usize> Params<T, J, F> {
     /// The grasp law.
     pub fn law(&self) -> &GraspLaw<T, J> {
         &self.prepared.law
-    }
-}
-
-/// Everything that the tick remembers.
-#[derive(Clone, Debug, PartialEq)]
-pub struct State<T, const J: usize, const F: usize> {
-    ticks: u32,
-    tracks: Tracks<T, J>,
-    motion: Motion<T, J>,
-    supervisor: Supervisor,
-    watched: Watched<T, J>,
-    /// How firmly this grasp is, when it is at its full force.
-    grasp: Firmness<T>,
-    /// The fingertips' attitudes when the grasp began, while there is one.
-    latch: Option<Latch<T, F>>,
-    /// Where everything was in the last tick with torque.
-    posture: Posture<T, J, F>,
-    /// Torques of the last tick, N m.
-    torques_nm: [T; J],
-}
-
-/// Force `f_d`, N, and attitude stiffness `K_st`, N m.
-#[derive(Clone, Copy, Debug, PartialEq)]
-struct Firmness<T> {
-    force_n: T,
-    attitude_stiffness_nm: T,
-}
-
-impl<T: Real, const J: usize, const F: usize> State<T, J, F> {
-    /// Disarmed, before the first tick.
-    pub fn new() -> Self {
-        Self {
-            ticks: 0,
-            tracks: Tracks::new(),
-            motion: Motion::still(),
-            supervisor: Supervisor::new(),
-            watched: Watched::new(),
-            grasp: Firmness { force_n: T::zero(), attitude_stiffness_nm: T::zero() },
-            latch: None,
-            posture: Posture::at_base(),
-            torques_nm: [T::zero(); J],
-        }
-    }
-
-    /// Joint angles as the last tick saw them, rad.
-    pub fn angles_rad(&self) -> &[T; J] {
-        &self.motion.angles_rad
-    }
-
-    /// Joint speeds as the last tick saw them, rad/s.
-    pub fn speeds_rad_s(&self) -> &[T; J] {
-        &self.motion.speeds_rad_s
-    }
-
-    /// The mode.
-    pub fn mode(&self) -> Mode {
-        self.supervisor.mode()
-    }
-
-    /// The fault that the hand is in, or that lets the object go.
-    pub fn fault(&self) -> Option<Raised> {
-        self.supervisor.fault()
-    }
-
-    /// The fingertips' attitudes when the grasp began, while there is one.
-    pub fn latch(&self) -> Option<&Latch<T, F>> {
-        self.latch.as_ref()
-    }
-}
-
-impl<const J: usize, const F: usize> State<f32, J, F> {
-    /// Writes all that the ticks to come depend on, and returns the part of the buffer that it takes up.
-    ///
-    /// # Errors
-    /// If the buffer is too small; [`BYTES_PER_JOINT`](crate::telemetry::snapshot::BYTES_PER_JOINT) for each joint
-    /// always suffice.
-    pub fn save<'b>(
-        &self,
-        params: &Params<f32, J, F>,
-        buffer: &'b mut [u8],
-    ) -> Result<&'b mut [u8], BufferTooSmall> {
-        let (joints, fingertips) = (params.hand.joint_count(), params.hand.fingertip_count());
-        let mut to = Saver::new(buffer);
-        to.u8(joints as u8)?;
-        to.u8(fingertips as u8)?;
-        to.u32(self.ticks)?;
-        self.supervisor.save(&mut to)?;
-        to.f32(self.grasp.force_n)?;
-        to.f32(self.grasp.attitude_stiffness_nm)?;
-        self.watched.save(joints, &mut to)?;
-        self.tracks.save(joints, &mut to)?;
-        self.motion.save(joints, &mut to)?;
-        self.torques_nm.iter().take(joints).try_for_each(|&torque| to.f32(torque))?;
-        to.u8(u8::from(self.latch.is_some()))?;
-        if let Some(latch) = &self.latch {
-            latch.save(fingertips, &mut to)?;
-        }
-        to.finish()
-    }
-
-    /// Reads what [`Self::save`] wrote. The ticks that follow are those that followed there, to the bit.
-    ///
-    /// # Errors
-    /// What is wrong with the bytes.
-    pub fn load(params: &Params<f32, J, F>, bytes: &[u8]) -> Result<Self, SnapshotError> {
-        let mut from = Loader::new(bytes);
-        let (joints, fingertips) = (from.u8()?, from.u8()?);
-        let here = (params.hand.joint_count(), params.hand.fingertip_count());
-        if (usize::from(joints), usize::from(fingertips)) != here {
-            return Err(SnapshotError::OtherHand { joints, fingertips });
-        }
-        let (joints, fingertips) = here;
-        let mut state = Self::new();
-        state.ticks = from.u32()?;
-        state.supervisor = Supervisor::load(&mut from)?;
-        state.grasp = Firmness { force_n: from.f32()?, attitude_stiffness_nm: from.f32()? };
-        state.watched = Watched::load(joints, &mut from)?;
-        state.tracks = Tracks::load(joints, &mut from)?;
-        state.motion = Motion::load(joints, &mut from)?;
-        for torque in state.torques_nm.iter_mut().take(joints) {
-            *torque = from.f32()?;
-        }
-        if from.flag()? {
-            state.latch = Some(Latch::load(fingertips, &mut from)?);
-        }
-        from.finish()?;
-        Ok(state)
-    }
-}
-
-impl<T: Real, const J: usize, const F: usize> Default for State<T, J, F> {
-    fn default() -> Self {
-        Self::new()
     }
 }
 
@@ -339,13 +215,24 @@ pub fn tick<T: Real, const J: usize, const F: usize>(
     if let (Some(Command::Grasp(grasp)), Mode::Grasping) = (input.command, state.supervisor.mode())
         && before != Mode::Grasping
     {
-        state.grasp = firmness(params, grasp);
+        state.grasp = gains(params, grasp);
     }
+    let grasped = state.latch.is_some();
     let mut action = act(params, state);
+    state.ledger.enter(&Entry {
+        motion: &state.motion,
+        last_nm: &state.torques_nm,
+        law: action.doing,
+        period_s: params.prepared.period_s,
+    });
+    if !grasped && state.latch.is_some() {
+        state.ledger.open();
+    }
 
     // The last gate: what came out may itself be a fault, and takes the torque away in this very tick.
     let saturation = params.prepared.watch.saturation(&mut state.watched, &action.limiting);
-    if let Some(raised) = action.not_finite.or(saturation) {
+    let energy = params.prepared.watch.energy(state.ledger.excess_j());
+    if let Some(raised) = action.not_finite.or(saturation).or(energy) {
         state.supervisor.raise(raised);
         state.latch = None;
         action = Action::none();
@@ -358,6 +245,8 @@ pub fn tick<T: Real, const J: usize, const F: usize>(
         Sensed::Ideal { .. } => (List::first_of([0; J], 0), None),
         Sensed::Failed(raised) => (List::first_of([0; J], 0), Some(raised)),
     };
+    let (gains, monitor) =
+        action.doing.map_or((Gains::none(), Monitor::none()), |doing| (doing.gains, doing.monitor));
     let record = Record {
         sequence: state.ticks,
         tick: state.ticks,
@@ -366,11 +255,15 @@ pub fn tick<T: Real, const J: usize, const F: usize>(
         answer,
         events: input.events,
         reading_failed,
-        force_n: action.grip.force_n,
-        attitude_stiffness_nm: action.grip.attitude_stiffness_nm,
-        approach_potential_j: action.monitor.approach_potential_j,
-        attitude_potential_j: action.monitor.attitude_potential_j,
-        energy_j: state.watched.energy_j(),
+        force_n: gains.force_n,
+        attitude_stiffness_nm: gains.attitude_stiffness_nm,
+        integral_gain_nm_rad: gains.integral_gain_nm_rad,
+        approach_potential_j: monitor.approach_potential_j,
+        attitude_potential_j: monitor.attitude_potential_j,
+        integral_potential_j: monitor.integral_potential_j,
+        work_j: state.ledger.work_j(),
+        damped_j: state.ledger.damped_j(),
+        excess_j: state.ledger.excess_j(),
         cycles: 0,
         late_ticks: state.watched.late_ticks(),
         dropped: 0,
@@ -392,10 +285,17 @@ fn sense<T: Real, const J: usize, const F: usize>(
     match *sensed {
         Sensed::Counts(counts) => state.motion = params.prepared.estimator.update(&mut state.tracks, counts),
         Sensed::Ideal { angles_rad, speeds_rad_s } => {
-            state.motion = Motion { angles_rad: *angles_rad, speeds_rad_s: *speeds_rad_s, ..Motion::still() };
+            let last_rad = &state.motion.angles_rad;
+            let moved_rad = core::array::from_fn(|k| {
+                let moved = angles_rad[k] - last_rad[k];
+                if moved.is_finite() { moved } else { T::zero() }
+            });
+            state.motion =
+                Motion { angles_rad: *angles_rad, speeds_rad_s: *speeds_rad_s, moved_rad, ..Motion::still() };
             state.tracks.restart();
         }
         Sensed::Failed(raised) => {
+            state.motion.moved_rad = [T::zero(); J];
             state.tracks.restart();
             return Some(raised);
         }
@@ -414,7 +314,6 @@ fn watch<T: Real, const J: usize, const F: usize>(
     // Each of them counts something, and is asked in every tick.
     let late = params.prepared.watch.lateness(watched, input.events.contains(Event::Late));
     let silent = params.prepared.watch.heartbeat(watched, input.events.contains(Event::Heartbeat));
-    let energy = params.prepared.watch.energy(watched, motion, torques_nm);
     let frozen = match input.sensed {
         Sensed::Counts(_) => {
             let grasping = matches!(supervisor.mode(), Mode::Grasping | Mode::Releasing);
@@ -424,7 +323,7 @@ fn watch<T: Real, const J: usize, const F: usize>(
     };
     let powered = !matches!(supervisor.mode(), Mode::Disarmed | Mode::Fault);
     let lost = (silent && powered).then_some(Raised::of_hand(Fault::LinkLost));
-    sensed.or(late).or(energy).or(frozen).or(lost)
+    sensed.or(late).or(frozen).or(lost)
 }
 
 /// Why a command can't be done even in a mode that takes it.
@@ -438,16 +337,20 @@ fn object<T: Real, const J: usize, const F: usize>(
         Command::Arm if events.contains(Event::FallbackClock) => Some(Refusal::FallbackClock),
         Command::Arm if params.prepared.watch.silent(&state.watched) => Some(Refusal::NoHeartbeat),
         Command::Grasp(grasp) => {
-            let Firmness { force_n, attitude_stiffness_nm } = firmness(params, grasp);
-            if !(force_n.is_finite() && attitude_stiffness_nm.is_finite()) {
+            let gains = gains(params, grasp);
+            let limits = &params.prepared.limits;
+            let Gains { force_n, attitude_stiffness_nm, integral_gain_nm_rad } = gains;
+            if !(force_n.is_finite() && attitude_stiffness_nm.is_finite() && integral_gain_nm_rad.is_finite())
+            {
                 Some(Refusal::NotFinite)
-            } else if !(params.prepared.limits.allows_force(force_n)
-                && params.prepared.limits.allows_attitude_stiffness(attitude_stiffness_nm))
+            } else if !(limits.allows_force(force_n)
+                && limits.allows_attitude_stiffness(attitude_stiffness_nm)
+                && limits.allows_integral_gain(integral_gain_nm_rad))
             {
                 Some(Refusal::OutOfRange)
             } else {
-                // To be told that it is done would be wrong for a grasp of other firmness.
-                let other = Firmness { force_n, attitude_stiffness_nm } != state.grasp;
+                // To be told that it is done would be wrong for a grasp of other gains.
+                let other = gains != state.grasp;
                 (state.supervisor.mode() == Mode::Grasping && other).then_some(Refusal::Grasping)
             }
         }
@@ -456,12 +359,14 @@ fn object<T: Real, const J: usize, const F: usize>(
 }
 
 /// How firmly a command wants to grasp.
-fn firmness<T: Real, const J: usize, const F: usize>(params: &Params<T, J, F>, grasp: Grasp) -> Firmness<T> {
-    Firmness {
-        force_n: grasp.force_n.map_or(params.prepared.law.force_n(), T::from_f32),
+fn gains<T: Real, const J: usize, const F: usize>(params: &Params<T, J, F>, grasp: Grasp) -> Gains<T> {
+    let configured = params.prepared.law.gains();
+    Gains {
+        force_n: grasp.force_n.map_or(configured.force_n, T::from_f32),
         attitude_stiffness_nm: grasp
             .attitude_stiffness_nm
-            .map_or(params.prepared.law.attitude_stiffness_nm(), T::from_f32),
+            .map_or(configured.attitude_stiffness_nm, T::from_f32),
+        integral_gain_nm_rad: grasp.integral_gain_nm_rad.map_or(configured.integral_gain_nm_rad, T::from_f32),
     }
 }
 
@@ -471,20 +376,14 @@ struct Action<T, const J: usize> {
     limiting: [Limiting; J],
     /// A torque that is not a finite number.
     not_finite: Option<Raised>,
-    grip: Firmness<T>,
-    monitor: Monitor<T>,
+    /// The law; `None` without torque.
+    doing: Option<Doing<T>>,
 }
 
 impl<T: Real, const J: usize> Action<T, J> {
     /// No torque.
     fn none() -> Self {
-        Self {
-            torques_nm: [T::zero(); J],
-            limiting: [Limiting::NONE; J],
-            not_finite: None,
-            grip: Firmness { force_n: T::zero(), attitude_stiffness_nm: T::zero() },
-            monitor: Monitor { approach_potential_j: T::zero(), attitude_potential_j: T::zero() },
-        }
+        Self { torques_nm: [T::zero(); J], limiting: [Limiting::NONE; J], not_finite: None, doing: None }
     }
 }
 
@@ -505,21 +404,25 @@ fn act<T: Real, const J: usize, const F: usize>(
     let posture = &state.posture;
     let grip = match drive {
         Drive::Off | Drive::Hold => None,
-        Drive::Grip { force_share, attitude_share } => Some(Grip {
-            latch: &*state.latch.get_or_insert_with(|| Latch::of(posture)),
-            force_n: state.grasp.force_n * force_share,
-            attitude_stiffness_nm: state.grasp.attitude_stiffness_nm * attitude_share,
+        Drive::Grip { force_share, stiffness_share } => Some(Grip {
+            latch: &*state.latch.get_or_insert_with(|| Latch::of(posture, angles_rad)),
+            gains: Gains {
+                force_n: state.grasp.force_n * force_share,
+                attitude_stiffness_nm: state.grasp.attitude_stiffness_nm * stiffness_share,
+                integral_gain_nm_rad: state.grasp.integral_gain_nm_rad * stiffness_share,
+            },
         }),
     };
-    let (wanted_nm, monitor) = params.prepared.law.torques(&params.hand, posture, speeds_rad_s, grip);
+    let law = &params.prepared.law;
+    let (wanted_nm, monitor) = law.torques(&params.hand, posture, angles_rad, speeds_rad_s, grip);
     let (torques_nm, limiting) =
         params.prepared.limits.apply(angles_rad, speeds_rad_s, &state.torques_nm, &wanted_nm);
     // A limit makes an infinite torque finite: both sides of it are looked at.
     let not_finite = params.prepared.watch.torques(&wanted_nm).or(params.prepared.watch.torques(&torques_nm));
-    let none = Firmness { force_n: T::zero(), attitude_stiffness_nm: T::zero() };
-    let grip = grip.map_or(none, |grip| Firmness {
-        force_n: grip.force_n,
-        attitude_stiffness_nm: grip.attitude_stiffness_nm,
-    });
-    Action { torques_nm, limiting, not_finite, grip, monitor }
+    let doing = Doing {
+        gains: grip.map_or(Gains::none(), |grip| grip.gains),
+        monitor,
+        damping_w: law.damping_power_w(speeds_rad_s),
+    };
+    Action { torques_nm, limiting, not_finite, doing: Some(doing) }
 }

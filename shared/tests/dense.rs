@@ -65,12 +65,13 @@ fn is<const J: usize>(heard: &Heard<'_, J>, sent: &Record12) {
     }
 }
 
-/// The bytes of interface version 3, as `docs/protocol.md` lays them down.
+/// The bytes of interface version 4, as `docs/protocol.md` lays them down.
 #[test]
 fn golden_bytes() {
     let mut sender = Sender::new();
     let mut first = record(70_000);
     first.sequence = 300;
+    first.approach_potential_j = 0.25;
     assert_eq!(sent(&mut sender, &first, Signals::FULL)[0], 3, "the first is in full");
     let mut limiting = [Limiting::NONE; 12];
     limiting[1].insert(Limit::Torque);
@@ -86,6 +87,8 @@ fn golden_bytes() {
         reading_failed: Some(Raised::of_hand(Fault::OutputFailed)),
         late_ticks: 2,
         dropped: 1,
+        work_j: -0.5,
+        excess_j: 0.0625,
         counts: List::first_of(counts, 12),
         limiting: List::first_of(limiting, 12),
         ..first
@@ -101,11 +104,10 @@ fn golden_bytes() {
         "f2",   // nibbles; all parts
         "0e0c", // cycles / 4
         "12",   // late, dropped
-        "0045",
-        "0000",
-        "0000",
-        "0000",
-        "0000", // law
+        // What is new: work and excess.
+        "a0", // which of law and ledger
+        "00b8",
+        "002c", // those
         "0302",
         "09ff",                                             // faults
         "d9e8e8e8e8e8e8e8e8e8e8eb",                         // counts
@@ -115,7 +117,7 @@ fn golden_bytes() {
     let (body, tail) = hex.split_at(golden.len());
     assert_eq!(body, golden);
     println!("check and digest {tail}");
-    assert_eq!(tail, "d4eb64");
+    assert_eq!(tail, "a1c783");
     // The hash once more, as the document says it, in wider arithmetic.
     let hash = |words: &mut dyn Iterator<Item = u32>| {
         words.fold(0_u32, |h, word| {
@@ -123,9 +125,11 @@ fn golden_bytes() {
             (u64::from(turned) * 0x9E37_79B9 % (1 << 32)) as u32
         })
     };
-    let numbers = [301, 70_001, 2, 1, 1].into_iter().chain(counts.map(|count| count as u32));
+    let halves = [0x4500, 0, 0, 0x3400, 0, 0, 0xb800, 0, 0x2c00];
+    let counted = counts.map(|count| count as u32);
+    let numbers = [301, 70_001, 2, 1, 1].into_iter().chain(halves).chain(counted);
     assert_eq!(u32::from(payload[payload.len() - 3]), hash(&mut numbers.into_iter()) >> 24);
-    let law = [5.0_f32, 0.0, 0.0, 0.0, 0.0].into_iter().chain([0.1; 12]);
+    let law = [5.0_f32, 0.0, 0.0, 0.25, 0.0, 0.0, -0.5, 0.0, 0.0625].into_iter().chain([0.1; 12]);
     let told = u16::from_le_bytes([payload[payload.len() - 2], payload[payload.len() - 1]]);
     assert_eq!(u32::from(told), hash(&mut law.map(f32::to_bits)) >> 16);
 }
@@ -147,10 +151,20 @@ fn full_records_come_where_they_must() {
     }
     let every = FULL_EVERY_TICKS;
     assert_eq!(full, [0, 30, 50, 60, 60 + every, 60 + 2 * every, 60 + 3 * every, 60 + 4 * every]);
+    // A device that was late and dropped much before anybody listened begins with one.
+    let mut sender = Sender::<12>::new();
+    let busy = |tick| Record { late_ticks: 40 + tick / 2, dropped: 99, ..record(tick) };
+    let full = (0..50).filter(|&tick| sent(&mut sender, &busy(tick), Signals::FULL)[0] != TAG);
+    assert_eq!(full.collect::<Vec<_>>(), [0]);
+    // Nor is it another list whether snapshots are sent.
+    let stateless = Signals::ALL.and(Signals::DENSE);
+    assert_eq!(sent(&mut sender, &busy(50), stateless)[0], TAG);
     // Without DENSE all are; and with other signals the first is.
-    assert_eq!(sent(&mut sender, &record(501), Signals::ALL)[0], 3);
+    let mut sender = Sender::<12>::new();
+    (0..3).for_each(|tick| drop(sent(&mut sender, &record(500 + tick), Signals::FULL)));
+    assert_eq!(sent(&mut sender, &record(503), Signals::ALL)[0], 3);
     // So many that who hears none of them knows that it has lost too many.
-    let full = (502..520)
+    let full = (504..520)
         .take_while(|&tick| sent(&mut sender, &record(tick), Signals::LIMITING.and(Signals::DENSE))[0] == 3);
     assert_eq!(full.count(), WINDOW);
 }
@@ -220,6 +234,11 @@ fn float() -> impl Strategy<Value = f32> {
     prop_oneof![3 => -2.0..2.0_f32, 1 => any::<u32>().prop_map(f32::from_bits)]
 }
 
+/// A number of law or ledger: often one that was there before, or rounds to it.
+fn law() -> impl Strategy<Value = f32> {
+    prop_oneof![8 => Just(0.5), 2 => Just(0.500_01), 2 => Just(0.0), 1 => float()]
+}
+
 fn limits(bits: [u8; 12]) -> [Limiting; 12] {
     bits.map(|bits| {
         let mut limiting = Limiting::NONE;
@@ -239,7 +258,7 @@ prop_compose! {
             proptest::option::weighted(0.1, (proptest::sample::select(Fault::ALL), proptest::option::of(any::<u8>()))),
             proptest::array::uniform12(prop_oneof![-20..20_i32, -2000..2000_i32]),
             prop_oneof![20 => Just(1_i32), 1 => Just(100_000), 1 => Just(0)],
-            (proptest::array::uniform5(float()), proptest::array::uniform12(float())),
+            (proptest::array::uniform9(law()), proptest::array::uniform12(float())),
             proptest::array::uniform12(prop_oneof![9 => Just(0_u8), 1 => 0..16_u8]),
             any::<u32>(),
             (0..100_u32, 0..100_u32, 0..1000_u32),
@@ -267,8 +286,9 @@ prop_compose! {
                 answer: answered.then_some(Answer { command: Command::Arm, refused: None }),
                 events: Events::NONE.with(Event::Late, lost % 7 == 0),
                 reading_failed: raised.filter(|_| failed),
-                force_n: law[0], attitude_stiffness_nm: law[1], approach_potential_j: law[2],
-                attitude_potential_j: law[3], energy_j: law[4],
+                force_n: law[0], attitude_stiffness_nm: law[1], integral_gain_nm_rad: law[2],
+                approach_potential_j: law[3], attitude_potential_j: law[4], integral_potential_j: law[5],
+                work_j: law[6], damped_j: law[7], excess_j: law[8],
                 counts: List::first_of(counts, if failed { 0 } else { 12 }),
                 torques_nm: List::first_of(torques, 12),
                 limiting: List::first_of(limits(limited), 12),

@@ -357,7 +357,8 @@ fn the_longest_messages_fit() {
     let sample = Sample { counts: all, failed: Some(Raised::at(255, Fault::OutputFailed)), late: true };
     let packet = Packet::<24> { session: u16::MAX, sequence: u16::MAX, request: Request::Joints(sample) };
     assert!(postcard_bytes(&packet, &mut buffer).len() <= Packet::<24>::MOST_BYTES);
-    let most = Grasp { force_n: Some(1.0), attitude_stiffness_nm: Some(1.0) };
+    let most =
+        Grasp { force_n: Some(1.0), attitude_stiffness_nm: Some(1.0), integral_gain_nm_rad: Some(1.0) };
     let packet = Packet::<1> {
         session: u16::MAX,
         sequence: u16::MAX,
@@ -375,9 +376,10 @@ fn the_longest_messages_fit() {
 /// Requests of every kind, most with values that can't be used.
 fn requests() -> impl Strategy<Value = Request<12>> {
     let parameter = proptest::sample::select(Parameter::ALL);
-    let grasp = any::<(Option<f32>, Option<f32>)>().prop_map(|(force_n, attitude_stiffness_nm)| {
-        Command::Grasp(Grasp { force_n, attitude_stiffness_nm })
-    });
+    let grasp =
+        any::<[Option<f32>; 3]>().prop_map(|[force_n, attitude_stiffness_nm, integral_gain_nm_rad]| {
+            Command::Grasp(Grasp { force_n, attitude_stiffness_nm, integral_gain_nm_rad })
+        });
     prop_oneof![
         any::<u16>().prop_map(|interface_version| Request::Hello { interface_version }),
         proptest::sample::select(&Command::ALL[..]).prop_map(Request::Command),

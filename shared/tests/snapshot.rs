@@ -61,7 +61,9 @@ fn script(seed: u64, ticks: usize) -> Vec<Step> {
                 _ => {}
             }
             silent = silent.saturating_sub(1);
-            let grasp = Grasp { force_n: Some(lcg.below(16) as f32), attitude_stiffness_nm: None };
+            let integral_gain_nm_rad = Some(0.01 * lcg.below(3) as f32);
+            let grasp =
+                Grasp { force_n: Some(lcg.below(16) as f32), integral_gain_nm_rad, ..Grasp::CONFIGURED };
             let command = match lcg.below(160) {
                 0..10 => Some(Command::Arm),
                 10..20 => Some(Command::Grasp(Grasp::CONFIGURED)),

@@ -135,7 +135,9 @@ fn attitudes_are_latched_at_the_first_grasping_tick_and_anew_for_each_grasp() {
 
 #[test]
 fn force_grows_over_the_soft_start_and_falls_over_the_release() {
-    let params = params(&config());
+    let mut config = config();
+    config.law.integral_gain_nm_rad = 0.25;
+    let params = params(&config);
     let mut state = in_mode(&params, Mode::Armed);
     let counts = facing_counts();
     let mut last = tick(&params, &mut state, &Input::counts(&counts, Some(GRASP))).record;
@@ -143,7 +145,7 @@ fn force_grows_over_the_soft_start_and_falls_over_the_release() {
     for _ in 1..100 {
         let record = tick(&params, &mut state, &Input::counts(&counts, None)).record;
         assert!(record.force_n > last.force_n);
-        assert_eq!(record.attitude_stiffness_nm, 5e-3);
+        assert_eq!((record.attitude_stiffness_nm, record.integral_gain_nm_rad), (5e-3, 0.25));
         last = record;
     }
     assert_eq!(last.force_n, 5.0);
@@ -151,10 +153,11 @@ fn force_grows_over_the_soft_start_and_falls_over_the_release() {
     for _ in 1..100 {
         let record = tick(&params, &mut state, &Input::counts(&counts, None)).record;
         assert!(record.force_n < last.force_n && record.attitude_stiffness_nm < last.attitude_stiffness_nm);
+        assert!((record.integral_gain_nm_rad - 50.0 * record.attitude_stiffness_nm).abs() < 1e-6);
         assert_eq!(record.mode, Mode::Releasing);
         last = record;
     }
-    assert_eq!((last.force_n, last.attitude_stiffness_nm), (0.0, 0.0));
+    assert_eq!((last.force_n, last.attitude_stiffness_nm, last.integral_gain_nm_rad), (0.0, 0.0, 0.0));
     let record = tick(&params, &mut state, &Input::counts(&counts, None)).record;
     assert_eq!((record.mode, state.latch()), (Mode::Armed, None));
 }
@@ -323,7 +326,9 @@ fn ideal_sensors_and_encoders_differ_by_the_estimator_alone() {
         let other = tick(&params, &mut with_angles, &Input::ideal(&angles, &speeds, command));
         assert_eq!(one.torques_nm, other.torques_nm);
         assert_eq!(other.record.counts.as_slice(), &[]);
-        assert_eq!(Record { counts: one.record.counts, ..other.record }, one.record);
+        // The ledger's turns are those of the counts, which here are not those of the angles.
+        let Record { counts, work_j, excess_j, .. } = one.record;
+        assert_eq!(Record { counts, work_j, excess_j, ..other.record }, one.record);
     }
     assert_eq!(with_counts.mode(), Mode::Armed);
 }
@@ -448,35 +453,121 @@ fn late_ticks_are_a_fault_and_the_fall_back_clock_does_not_arm() {
     assert_eq!((record.mode, record.events), (Mode::Disarmed, events));
 }
 
-#[test]
-fn work_beyond_its_limit_is_a_fault() {
+/// A hand without weight and stops, whose ledger may show so much excess.
+fn ledger_config(excess_j: f32) -> Config<f32, 12> {
     let mut config: Config<f32, 12> = config();
     config.law.gravity_m_s2 = None;
     config.limits.stops = None;
-    config.faults.energy_j = Some(0.02);
-    let params: TestParams = params(&config);
+    config.faults = FaultConfig { energy_j: Some(excess_j), ..FaultConfig::LEAST };
+    config
+}
+
+/// Fingers that close in free air are pulled by the law, which gives what it loses of its potentials: much work, and
+/// hardly any excess.
+#[test]
+fn work_that_the_potentials_give_is_no_fault() {
+    let params: TestParams = params(&ledger_config(5e-3));
     let mut state = in_mode(&params, Mode::Grasping);
-    // The fingers close in free air, pulled by the law: 2 rad/s at some 0.2 N m.
     let mut counts = facing_counts();
     let mut output = drive(&params, &mut state, &[], 100);
-    for _ in 0..100 {
+    let first = output.record.clone();
+    let potential_j = |record: &Record<f32, 12>| record.approach_potential_j + record.attitude_potential_j;
+    for _ in 0..60 {
         for (count, torque) in counts.iter_mut().zip(output.torques_nm) {
             *count += if torque > 0.0 { 7 } else { -7 };
         }
         output = tick(&params, &mut state, &Input::counts(&counts, None));
-        let over = output.record.energy_j > 0.02;
-        assert_eq!(output.record.fault, over.then_some(Raised::of_hand(Fault::TooMuchEnergy)));
+        assert_eq!(output.record.fault, None);
+    }
+    let record = &output.record;
+    let (work_j, drop_j) = (record.work_j - first.work_j, potential_j(&first) - potential_j(record));
+    println!("work {work_j} J, drop {drop_j} J, damped {} J, excess {} J", record.damped_j, record.excess_j);
+    assert!(work_j > 0.02);
+    // Torques that are a tick and a half old are those of fingers that are still 3 mrad farther apart, of 50 in all.
+    assert!(record.excess_j.abs() < 0.1 * work_j);
+    // What fades in 60 ms: 6 % of it.
+    assert!((work_j - drop_j - record.excess_j).abs() < 0.06 * record.excess_j.abs() + 1e-4);
+}
+
+/// A torque that comes late, here because of the slew limit, feeds a swing: nothing of that comes from the potentials.
+#[test]
+fn work_beyond_the_potentials_is_a_fault_in_its_tick() {
+    let mut config = ledger_config(2e-3);
+    config.limits.slew_nm_s = Some([1.0; 12]);
+    let params: TestParams = params(&config);
+    let mut state = in_mode(&params, Mode::Grasping);
+    drive(&params, &mut state, &[], 200);
+    let mut last_j = 0.0;
+    for k in 0..2000 {
+        // 0.2 rad at 5 Hz, as a triangle.
+        let way = (k + 50) % 200;
+        let turned = 13 * (if way < 100 { way } else { 200 - way } - 50);
+        let counts = facing_counts().map(|count: i32| count + turned);
+        let record = tick(&params, &mut state, &Input::counts(&counts, None)).record;
+        let over = record.excess_j > 2e-3;
+        assert_eq!(record.fault, over.then_some(Raised::of_hand(Fault::TooMuchEnergy)), "tick {k}");
         if over {
+            assert!(last_j <= 2e-3 && record.torques_nm.iter().all(|&torque| torque == 0.0));
+            // Without torque its cause is gone, and the next grasp begins with nothing.
+            let counts = facing_counts();
+            let cleared =
+                tick(&params, &mut state, &Input::counts(&counts, Some(Command::ClearFault))).record;
+            assert_eq!((cleared.mode, cleared.excess_j), (Mode::Disarmed, 0.0));
             return;
         }
+        last_j = record.excess_j;
     }
-    panic!("{} J", output.record.energy_j);
+    panic!("{last_j} J");
+}
+
+/// The sums are those since the latch closed, and stay when the torque is gone.
+#[test]
+fn the_ledger_begins_anew_with_each_grasp() {
+    let params: TestParams = params(&ledger_config(1.0));
+    let mut state = in_mode(&params, Mode::Armed);
+    let mut counts = facing_counts();
+    for tick_in_mode in 0..200 {
+        counts.iter_mut().for_each(|count| *count += 7 * (1 - 2 * (tick_in_mode / 10 % 2)));
+        tick(&params, &mut state, &Input::counts(&counts, None));
+    }
+    let armed = tick(&params, &mut state, &Input::counts(&counts, None)).record;
+    assert!(armed.work_j < 0.0 && armed.damped_j > 0.0, "somebody moves damped joints");
+    let grasp = tick(&params, &mut state, &Input::counts(&counts, Some(GRASP))).record;
+    assert_eq!((grasp.work_j, grasp.damped_j), (0.0, 0.0));
+    for _ in 0..100 {
+        counts.iter_mut().for_each(|count| *count += 3);
+        tick(&params, &mut state, &Input::counts(&counts, None));
+    }
+    let last = tick(&params, &mut state, &Input::counts(&counts, Some(Command::Stop))).record;
+    assert!(last.work_j != 0.0 && last.damped_j > 0.0 && last.excess_j == 0.0);
+    let work_j = last.work_j;
+    for _ in 0..100 {
+        let rest = tick(&params, &mut state, &Input::counts(&counts, None)).record;
+        assert_eq!((rest.work_j, rest.damped_j), (work_j, last.damped_j));
+    }
+}
+
+/// The force that a reading would have turned the joints by is not there; nor is its work.
+#[test]
+fn a_failed_reading_does_no_work() {
+    let params: TestParams = params(&ledger_config(1.0));
+    let mut state = in_mode(&params, Mode::Grasping);
+    let mut counts = facing_counts();
+    let mut before = drive(&params, &mut state, &[], 100).record;
+    for _ in 0..5 {
+        counts.iter_mut().for_each(|count| *count += 7);
+        before = tick(&params, &mut state, &Input::counts(&counts, None)).record;
+    }
+    let failed = tick(&params, &mut state, &missing(3)).record;
+    assert_eq!(failed.work_j, before.work_j);
 }
 
 #[test]
 fn a_grasp_is_as_firm_as_asked_for_within_the_limits() {
     let params: TestParams = params(&config());
-    let grasp = |force_n, attitude_stiffness_nm| Command::Grasp(Grasp { force_n, attitude_stiffness_nm });
+    let grasp = |force_n, attitude_stiffness_nm, integral_gain_nm_rad| {
+        Command::Grasp(Grasp { force_n, attitude_stiffness_nm, integral_gain_nm_rad })
+    };
     let counts = facing_counts();
     let mut state = in_mode(&params, Mode::Armed);
     let refused = |state: &mut TestState, command| {
@@ -484,20 +575,30 @@ fn a_grasp_is_as_firm_as_asked_for_within_the_limits() {
         record.answer.and_then(|answer| answer.refused)
     };
     for bad in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
-        assert_eq!(refused(&mut state, grasp(Some(bad), None)), Some(Refusal::NotFinite));
-        assert_eq!(refused(&mut state, grasp(None, Some(bad))), Some(Refusal::NotFinite));
+        for command in
+            [grasp(Some(bad), None, None), grasp(None, Some(bad), None), grasp(None, None, Some(bad))]
+        {
+            assert_eq!(refused(&mut state, command), Some(Refusal::NotFinite));
+        }
     }
-    for (force_n, stiffness_nm) in
-        [(Some(-0.1), None), (Some(500.1), None), (None, Some(0.11)), (None, Some(-1e-9))]
-    {
-        assert_eq!(refused(&mut state, grasp(force_n, stiffness_nm)), Some(Refusal::OutOfRange));
+    for command in [
+        grasp(Some(-0.1), None, None),
+        grasp(Some(500.1), None, None),
+        grasp(None, Some(0.11), None),
+        grasp(None, Some(-1e-9), None),
+        grasp(None, None, Some(1.1)),
+        grasp(None, None, Some(-1e-9)),
+    ] {
+        assert_eq!(refused(&mut state, command), Some(Refusal::OutOfRange));
     }
     assert_eq!(state.mode(), Mode::Armed);
-    assert_eq!(refused(&mut state, grasp(Some(2.0), Some(0.01))), None);
+    assert_eq!(refused(&mut state, grasp(Some(2.0), Some(0.01), Some(0.5))), None);
     let record = drive(&params, &mut state, &[], 100).record;
-    assert_eq!((record.force_n, record.attitude_stiffness_nm), (2.0, 0.01));
-    // The same again is done; another firmness would be a lie.
-    assert_eq!(refused(&mut state, grasp(Some(2.0), Some(0.01))), None);
+    let gains = (record.force_n, record.attitude_stiffness_nm, record.integral_gain_nm_rad);
+    assert_eq!(gains, (2.0, 0.01, 0.5));
+    // The same again is done; other gains would be a lie.
+    assert_eq!(refused(&mut state, grasp(Some(2.0), Some(0.01), Some(0.5))), None);
+    assert_eq!(refused(&mut state, grasp(Some(2.0), Some(0.01), None)), Some(Refusal::Grasping));
     assert_eq!(refused(&mut state, GRASP), Some(Refusal::Grasping));
     let record = drive(&params, &mut state, &[], 1).record;
     assert_eq!(record.force_n, 2.0);

@@ -11,7 +11,7 @@ use blindgrasp::plant::friction::JointFriction;
 use blindgrasp::plant::polyhedron::Polyhedron;
 use blindgrasp::plant::{Motion, ObjectModel, Plant, PlantModel};
 use blindgrasp::{Hand, MAX_FINGERS, MAX_JOINTS, Posture};
-use blindgrasp_shared::control::{GraspConfig, GraspLaw, Grip, Latch};
+use blindgrasp_shared::control::{GraspConfig, GraspLaw, Latch, Monitor};
 use blindgrasp_shared::math::Real;
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 
@@ -92,8 +92,8 @@ pub struct Grasp {
     pub start: Motion,
     /// The grasp law.
     pub law: GraspLaw<f64, MAX_JOINTS>,
-    /// The fingertips' attitudes at the start.
-    pub latch: Latch<f64, MAX_FINGERS>,
+    /// How the hand stands at the start.
+    pub latch: Latch<f64, MAX_JOINTS, MAX_FINGERS>,
 }
 
 impl Grasp {
@@ -120,6 +120,7 @@ impl Grasp {
         let config = GraspConfig {
             force_n: FORCE_N,
             attitude_stiffness_nm: ATTITUDE_STIFFNESS_NM,
+            integral_gain_nm_rad: 0.0,
             damping_nm_s,
             gravity_m_s2: Some(GRAVITY_M_S2),
         };
@@ -144,7 +145,7 @@ impl Grasp {
             object_gravity_m_s2: Vector3::zeros(),
         };
         let start = Motion::at_rest(angles_rad, held.position_m, held.attitude);
-        Self { description, model, start, law, latch: Latch::of(&posture) }
+        Self { description, model, start, law, latch: Latch::of(&posture, &angles_rad) }
     }
 
     /// The plant at the start.
@@ -158,20 +159,21 @@ impl Grasp {
         }
     }
 
-    fn grip(&self) -> Grip<'_, f64, MAX_FINGERS> {
-        self.law.grip(&self.latch)
+    /// The law at the plant's motion.
+    fn law_at(&self, plant: &Plant) -> (JointVector, Monitor<f64>) {
+        let Motion { angles_rad, speeds_rad_s, .. } = plant.motion();
+        let grip = self.law.grip(&self.latch);
+        self.law.torques(&self.model.hand, plant.posture(), angles_rad, speeds_rad_s, Some(grip))
     }
 
     /// The law's torques for the plant's motion, N m.
     pub fn torques(&self, plant: &Plant) -> JointVector {
-        let speeds = &plant.motion().speeds_rad_s;
-        self.law.torques(&self.model.hand, plant.posture(), speeds, Some(self.grip())).0
+        self.law_at(plant).0
     }
 
     /// Energy `E = K + V_s + V_st + P` of Eq. 40, with the least value of each term at zero, J.
     pub fn energy_j(&self, plant: &Plant) -> f64 {
-        let speeds = &plant.motion().speeds_rad_s;
-        let monitor = self.law.torques(&self.model.hand, plant.posture(), speeds, Some(self.grip())).1;
+        let monitor = self.law_at(plant).1;
         plant.kinetic_energy_j()
             + plant.elastic_energy_j()
             + monitor.approach_potential_j

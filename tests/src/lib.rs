@@ -2,6 +2,8 @@
 //!
 //! - `board` (feature `firmware`): the image `hand`, running in QEMU; `conversation`: the host's end of a link, frame by
 //!   frame; `damage`: frames that a line has damaged.
+//! - [`books`]: where the energy of a simulated hand goes, sub-step by sub-step.
+//! - [`cases`]: random hands with the grasp law, and the paper's potentials as they are printed.
 //! - [`description`]: a hand in the user's frames, with forward kinematics written a second time, straight from the
 //!   description.
 //! - [`random`]: seeded random numbers, rotations, inertias and hands.
@@ -18,6 +20,8 @@
 
 #[cfg(all(unix, feature = "firmware"))]
 pub mod board;
+pub mod books;
+pub mod cases;
 #[cfg(all(unix, feature = "firmware"))]
 pub mod conversation;
 #[cfg(all(unix, feature = "firmware"))]

@@ -1,6 +1,7 @@
 //! A simulated hand whose controller is watched: the tick with everything that a real hand's supervisor has, a host that
 //! commands it and gives signs of life, wrong wiring, and people who push.
 
+use crate::books::stored_j;
 use blindgrasp::plant::{Motion, Plant};
 use blindgrasp::scene::{HandModel, Scene};
 use blindgrasp::sim::controller::{Controller, Reach, Stepped, Turn};
@@ -53,8 +54,16 @@ pub struct Turned {
     pub force_n: f32,
     /// The attitude stiffness `K_st` that acts, N m.
     pub attitude_stiffness_nm: f32,
-    /// Work of the joints in the last second, J.
-    pub energy_j: f32,
+    /// The gain `K_I` of the earlier law that acts, N m/rad.
+    pub integral_gain_nm_rad: f32,
+    /// Potentials of the law: approach, attitudes, integral, J.
+    pub potentials_j: [f32; 3],
+    /// Work of the motors since the grasp began, J.
+    pub work_j: f32,
+    /// What the law's damping took of it, J.
+    pub damped_j: f32,
+    /// Work of the last second beyond the drop of the potentials, J.
+    pub excess_j: f32,
     /// The mode.
     pub mode: Mode,
     /// The fault that the hand is in.
@@ -97,7 +106,15 @@ impl Controller for Supervised {
                 limiting,
                 force_n: record.force_n,
                 attitude_stiffness_nm: record.attitude_stiffness_nm,
-                energy_j: record.energy_j,
+                integral_gain_nm_rad: record.integral_gain_nm_rad,
+                potentials_j: [
+                    record.approach_potential_j,
+                    record.attitude_potential_j,
+                    record.integral_potential_j,
+                ],
+                work_j: record.work_j,
+                damped_j: record.damped_j,
+                excess_j: record.excess_j,
                 mode: record.mode,
                 fault: record.fault,
             });
@@ -204,7 +221,6 @@ pub fn push_nm(scene: &Scene, fingertip: usize, force_n: Vector3<f64>) -> [f32; 
 /// # Panics
 /// If the scene has no equations of motion.
 pub fn mechanical_energy_j(scene: &Scene, outcome: &Outcome, from: usize) -> Vec<f64> {
-    let gravity = Vector3::from(scene.plant.gravity_m_s2);
     let energy = |sample: &blindgrasp::record::sample::Sample| {
         let padded = |values: &[f64]| std::array::from_fn(|k| values.get(k).copied().unwrap_or(0.0));
         let motion = Motion {
@@ -216,12 +232,7 @@ pub fn mechanical_energy_j(scene: &Scene, outcome: &Outcome, from: usize) -> Vec
             spin_rad_s: sample.spin_rad_s,
         };
         let plant = Plant::new(model(scene), motion, scene.plant.substep_s).expect("it ran");
-        let mut weight_j = 0.0;
-        for k in 0..scene.hand.joint_count() {
-            let link = scene.hand.link(k);
-            weight_j -= link.mass_kg * gravity.dot(&plant.posture().link(k).point(&link.mass_centre_m));
-        }
-        plant.kinetic_energy_j() + plant.elastic_energy_j() + weight_j
+        stored_j(&plant)
     };
     outcome.run.samples[from.min(outcome.run.samples.len())..].iter().map(energy).collect()
 }

@@ -1,163 +1,12 @@
 //! The grasp law against the paper's formulas as they are printed: Eqs. 30-34 and 59 for the torques, Eqs. 43 and 44
 //! for the potentials.
 
-use blindgrasp_shared::control::{GraspConfig, GraspLaw, Grip, Latch};
-use blindgrasp_shared::hand::{Hand, Posture, Wrench};
-use blindgrasp_tests::description::{Description, Placed};
-use blindgrasp_tests::numeric::{Errors, derivative};
+use blindgrasp_shared::control::Latch;
+use blindgrasp_shared::hand::Wrench;
+use blindgrasp_tests::cases::{Case, JOINTS, K_ST_NM, RandomHand, cases, law};
+use blindgrasp_tests::numeric::Errors;
 use blindgrasp_tests::random::Draw;
 use nalgebra::{Matrix3, Vector3};
-
-const JOINTS: usize = 30;
-const FINGERS: usize = 5;
-const FORCE_N: f64 = 5.0;
-const K_ST_NM: f64 = 0.3;
-
-type RandomHand = Hand<f64, JOINTS, FINGERS>;
-type Torques = [f64; JOINTS];
-
-/// A random hand somewhere after its latch, with the law prepared for it.
-struct Case {
-    draw: Draw,
-    description: Description,
-    hand: RandomHand,
-    law: GraspLaw<f64, JOINTS>,
-    damping: Torques,
-    gravity: Vector3<f64>,
-    angles: Torques,
-    speeds: Torques,
-    /// Joint angles when the grasp began.
-    latched: Torques,
-}
-
-fn cases(seed: u64, count: usize) -> impl Iterator<Item = Case> {
-    let mut draw = Draw::new(seed);
-    (0..count).map(move |k| Case::of(draw.hand(k % 2 == 0), Draw::new(seed + 1 + k as u64)))
-}
-
-impl Case {
-    fn of(description: Description, mut draw: Draw) -> Self {
-        let hand: RandomHand = description.hand();
-        let latched = draw.joints::<JOINTS>(2.0);
-        let moved = draw.joints::<JOINTS>(0.7);
-        let damping = draw.joints::<JOINTS>(0.1).map(f64::abs);
-        let gravity = draw.vector(9.81);
-        let law = law(&hand, K_ST_NM, &damping, &gravity);
-        Self {
-            angles: std::array::from_fn(|k| latched[k] + moved[k]),
-            speeds: draw.joints(2.0),
-            latched,
-            damping,
-            gravity,
-            law,
-            hand,
-            description,
-            draw,
-        }
-    }
-
-    fn posture(&self, angles: &Torques) -> Posture<f64, JOINTS, FINGERS> {
-        let mut posture = Posture::at_base();
-        self.hand.forward_kinematics(angles, &mut posture);
-        posture
-    }
-
-    fn latch(&self) -> Latch<f64, FINGERS> {
-        Latch::of(&self.posture(&self.latched))
-    }
-
-    /// Torques at some speeds, with shares of the force and of the attitudes' stiffness.
-    fn torques(&self, speeds: &Torques, shares: (f64, f64)) -> Torques {
-        let latch = self.latch();
-        let grip = Grip {
-            latch: &latch,
-            force_n: self.law.force_n() * shares.0,
-            attitude_stiffness_nm: self.law.attitude_stiffness_nm() * shares.1,
-        };
-        self.law.torques(&self.hand, &self.posture(&self.angles), speeds, Some(grip)).0
-    }
-
-    /// A potential's gradient along each joint, by differences.
-    ///
-    /// A fingertip's centre and attitude are first-degree in the sine and cosine of one joint, the potentials
-    /// second-degree: truncation is at most `2^5 step^4 / 480` = 1e-12 of them, rounding 1e-16 / step = 5e-14.
-    fn gradient(&self, potential: impl Fn(&Placed) -> f64) -> Vec<f64> {
-        let at = |k: usize, by: f64| {
-            let mut angles = self.angles;
-            angles[k] += by;
-            potential(&self.description.placed(&angles))
-        };
-        (0..self.hand.joint_count()).map(|k| derivative(1.0 / 512.0, |by| at(k, by))).collect()
-    }
-
-    /// Fingertip attitudes in frames of the test's own choice: the description's link frames, turned by constants.
-    fn tip_frames(&self, offsets: &[Matrix3<f64>], angles: &Torques) -> Vec<Matrix3<f64>> {
-        self.frames_of(offsets, &self.description.placed(angles))
-    }
-
-    fn frames_of(&self, offsets: &[Matrix3<f64>], placed: &Placed) -> Vec<Matrix3<f64>> {
-        let tips = self.description.fingertips.iter().zip(offsets);
-        tips.map(|(tip, offset)| placed.attitudes[tip.link] * offset).collect()
-    }
-
-    fn offsets(&mut self) -> Vec<Matrix3<f64>> {
-        self.description.fingertips.iter().map(|_| self.draw.rotation()).collect()
-    }
-
-    /// `V_s` as printed in Eq. 43.
-    fn approach_potential(&self, placed: &Placed) -> f64 {
-        let centres = &placed.centres_m;
-        let mut sum = 0.0;
-        for a in centres {
-            for b in centres {
-                sum += (a - b).norm_squared();
-            }
-        }
-        self.stiffness() / (4.0 * centres.len() as f64) * sum
-    }
-
-    /// `V_st` as printed in Eq. 44, with the relative attitudes of Eq. 59.
-    fn attitude_potential(&self, now: &[Matrix3<f64>], then: &[Matrix3<f64>]) -> f64 {
-        let n = now.len();
-        let mut sum = 0.0;
-        for i in 0..n {
-            let j = (i + 1) % n;
-            let relative = then[j].transpose() * then[i];
-            sum += (now[i].transpose() * now[j] * relative).trace();
-        }
-        -K_ST_NM * sum
-    }
-
-    /// `A = f_d / sum(r)`.
-    fn stiffness(&self) -> f64 {
-        FORCE_N / self.description.fingertips.iter().map(|tip| tip.radius_m).sum::<f64>()
-    }
-
-    /// The most that the approach could put on a joint, N m: every fingertip's force at the end of the longest lever.
-    fn approach_scale(&self) -> f64 {
-        let reach = (0..self.hand.fingertip_count()).map(|i| self.description.reach_m(i)).fold(0.0, f64::max);
-        let forces = self.law.approach_wrenches(&self.hand, &self.posture(&self.angles));
-        reach * forces.iter().map(|wrench| wrench.force_n.norm()).sum::<f64>()
-    }
-
-    /// The most that the links could weigh on a joint, N m.
-    fn weight_scale(&self) -> f64 {
-        let reach = (0..self.hand.fingertip_count()).map(|i| self.description.reach_m(i)).fold(0.0, f64::max);
-        self.description.joints.iter().map(|joint| joint.link.mass_kg).sum::<f64>()
-            * self.gravity.norm()
-            * reach
-    }
-}
-
-fn law(hand: &RandomHand, k_st: f64, damping: &Torques, gravity: &Vector3<f64>) -> GraspLaw<f64, JOINTS> {
-    let config = GraspConfig {
-        force_n: FORCE_N,
-        attitude_stiffness_nm: k_st,
-        damping_nm_s: *damping,
-        gravity_m_s2: Some(*gravity),
-    };
-    config.prepare(hand).expect("the gains are good")
-}
 
 /// Eq. 30 is the gradient of Eq. 43, with damping and the weight of the links beside it.
 ///
@@ -173,9 +22,7 @@ fn the_approach_is_the_negative_gradient_of_its_potential() {
         for k in 0..case.hand.joint_count() {
             errors.add((torques[k] + gradient[k] + case.damping[k] * case.speeds[k] - weight[k]) / scale);
         }
-        let latch = case.latch();
-        let grip = Grip { attitude_stiffness_nm: 0.0, ..case.law.grip(&latch) };
-        let monitor = case.law.torques(&case.hand, &case.posture(&case.angles), &case.speeds, Some(grip)).1;
+        let monitor = case.monitor();
         let potential = case.approach_potential(&case.description.placed(&case.angles));
         potentials.add((monitor.approach_potential_j - potential) / case.approach_scale());
     }
@@ -202,9 +49,7 @@ fn the_relative_attitudes_are_the_negative_gradient_of_their_potential() {
         for k in 0..case.hand.joint_count() {
             errors.add((with[k] - without[k] + gradient[k]) / (2.0 * n * K_ST_NM));
         }
-        let latch = case.latch();
-        let grip = case.law.grip(&latch);
-        let monitor = case.law.torques(&case.hand, &case.posture(&case.angles), &case.speeds, Some(grip)).1;
+        let monitor = case.monitor();
         // The law's has the constant that makes it zero at the latch.
         let expected =
             case.attitude_potential(&case.tip_frames(&offsets, &case.angles), &then) + 3.0 * n * K_ST_NM;
@@ -287,6 +132,25 @@ fn two_fingers_are_neighbours_twice() {
     // A few roundings of numbers of the size of `4 K_st`.
     assert!((wrenches[0].moment_nm - expected).norm() < 1e-14, "{} {expected}", wrenches[0].moment_nm);
     assert!((wrenches[1].moment_nm + expected).norm() < 1e-14);
+}
+
+/// The potential energy of the links' weight is, but for a constant, that of their centres of mass.
+///
+/// Tolerance: 1e-14 of the weight at the end of the reach: sums of up to thirty links.
+#[test]
+fn the_weight_that_is_held_is_that_of_the_links() {
+    let mut errors = Errors::new();
+    for mut case in cases(2500, 300) {
+        let both = [case.angles, case.latched].map(|angles| {
+            case.angles = angles;
+            let placed = case.description.placed(&angles);
+            (case.monitor().weight_potential_j, case.description.weight_potential_j(&placed, &case.gravity))
+        });
+        let [(held, weight), (held_before, weight_before)] = both;
+        errors.add(((held - held_before) - (weight - weight_before)) / case.weight_scale());
+    }
+    println!("potential energy of the weight: {errors}");
+    assert!(errors.largest() < 1e-14);
 }
 
 /// What each term puts on the fingertips sums to no force and no moment, about any point; so joints that carry all
@@ -372,8 +236,7 @@ fn nothing_pulls_at_the_attitudes_at_the_latch() {
         for wrench in case.law.attitude_wrenches(&case.hand, &posture, &latch) {
             moments.add(wrench.moment_nm.norm() / K_ST_NM);
         }
-        let grip = case.law.grip(&latch);
-        let monitor = case.law.torques(&case.hand, &posture, &case.speeds, Some(grip)).1;
+        let monitor = case.monitor();
         potentials.add(monitor.attitude_potential_j / K_ST_NM);
     }
     println!("at the latch: B_st {moments}; V_st {potentials}");
@@ -388,21 +251,23 @@ fn normal_only_knows_no_latch() {
     for mut case in cases(8000, 100) {
         let normal_only = law(&case.hand, 0.0, &case.damping, &case.gravity);
         let posture = case.posture(&case.angles);
-        let latches = [case.latch(), Latch::of(&posture)];
+        let latches = [case.latch(), Latch::of(&posture, &case.angles)];
         let approach = case.torques(&case.speeds, (1.0, 0.0));
         for latch in &latches {
             let grip = normal_only.grip(latch);
-            let (torques, monitor) = normal_only.torques(&case.hand, &posture, &case.speeds, Some(grip));
+            let (torques, monitor) =
+                normal_only.torques(&case.hand, &posture, &case.angles, &case.speeds, Some(grip));
             assert_eq!(torques, approach);
             assert_eq!(monitor.attitude_potential_j, 0.0);
         }
         let weight = case.hand.gravity_torques(&posture, &case.gravity);
         let pulls = case.hand.fingertip_torques(&posture, &case.law.approach_wrenches(&case.hand, &posture));
         let expected: [f64; JOINTS] = std::array::from_fn(|k| pulls[k] + weight[k]);
+        let (angles, rest) = (&case.angles, [0.0; JOINTS]);
         let still =
-            normal_only.torques(&case.hand, &posture, &[0.0; JOINTS], Some(normal_only.grip(&latches[0])));
+            normal_only.torques(&case.hand, &posture, angles, &rest, Some(normal_only.grip(&latches[0])));
         assert_eq!(still.0, expected);
-        let released = case.law.torques(&case.hand, &posture, &[0.0; JOINTS], None).0;
+        let released = case.law.torques(&case.hand, &posture, angles, &rest, None).0;
         assert_eq!(released, weight);
         case.speeds = [0.0; JOINTS];
         assert_eq!(case.torques(&case.speeds, (0.0, 0.0)), released);

@@ -23,10 +23,11 @@ use blindgrasp_shared::fault::{Fault, Raised, Reaction};
 use blindgrasp_shared::limit::Limit;
 use blindgrasp_shared::supervisor::Mode;
 use blindgrasp_shared::tick::Config;
+use blindgrasp_tests::books::true_excess_j;
 use blindgrasp_tests::generated;
 use blindgrasp_tests::supervised::{
-    Course, HEARTBEAT_TICKS, Outcome, config, friction_energy_j, mechanical_energy_j, push_nm, run, run_with,
-    scene,
+    Course, HEARTBEAT_TICKS, Outcome, Turned, config, friction_energy_j, mechanical_energy_j, push_nm, run,
+    run_with, scene,
 };
 use nalgebra::Vector3;
 use std::ops::RangeInclusive;
@@ -364,27 +365,20 @@ fn fast_joints() -> Row {
     row
 }
 
-/// Closing takes up to 5 mJ: with a limit of 2 mJ that is too much. The work itself is added up from the plant.
-fn worked_too_much() -> Row {
-    let mut row = Row::new(Fault::TooMuchEnergy, "closing takes 5 mJ; limit 2 mJ", "cube, prism");
+/// Four times the force that the gains are for: the delay feeds a swing that the damping does not take out. In truth the
+/// excess is reckoned from the plant's own turns and the torques that acted.
+fn swings_up() -> Row {
+    let what = "four times the force: what is fed by the delay swings up";
+    let mut row = Row::new(Fault::TooMuchEnergy, what, "cube, prism");
     for name in ["cube", "prism"] {
-        let (scene, healthy) = healthy(name);
-        let limit_j = 2e-3;
-        let config = changed(&scene, |config| config.faults.energy_j = Some(limit_j as f32));
-        let outcome = run_with(&scene, &config, &Course::default());
+        let scene = scene(name, &["duration_s=1.5", "control.force_n=20"]);
+        let limit_j = f64::from(config(&scene).faults.energy_j.expect("it is watched"));
+        let outcome = run(&scene, &Course::default());
         let at = found(&outcome, Fault::TooMuchEnergy, None);
-        // In truth, of the torques that acted and the true speeds; of what was done a second ago, 1/e counts.
-        let mut work_j = vec![0.0];
-        for sample in &healthy.run.samples {
-            let power_w: f64 = sample.torques_nm.iter().zip(&sample.speeds_rad_s).map(|(a, b)| a * b).sum();
-            let last_j = work_j[work_j.len() - 1];
-            work_j.push(last_j + (power_w - last_j) * scene.control.period_s);
-        }
-        // Estimated speed and output are late, so that the tick's sum is off by a little.
-        assert!(work_j[at as usize] > 0.9 * limit_j, "{} J", work_j[at as usize]);
-        let since = work_j.iter().position(|&work_j| work_j > limit_j).expect("closing takes more") as u64;
-        let since = since.min(at);
-        row.add(since, at, &falls_off(&scene, Some(&healthy), &outcome, at));
+        let so = true_excess_j(&scene, &outcome).iter().position(|&excess_j| excess_j > limit_j);
+        // Counted turns and the mean of two torques may tell of it a little before.
+        let since = so.map_or(at, |since| at.min(since as u64));
+        row.add(since, at, &falls_off(&scene, None, &outcome, at));
     }
     row
 }
@@ -418,7 +412,7 @@ fn faults_are_found_and_the_torque_goes() {
         lost_links(Kind::LinkCut, "the link is cut"),
         lost_links(Kind::HeartbeatStops, "the heartbeat stops, commands still arrive"),
         late_ticks(),
-        worked_too_much(),
+        swings_up(),
     ];
     for row in &rows {
         println!("{:?} found {:?} off {:?} fastest {}", row.fault, row.found, row.off, row.fastest_rad_s);
@@ -709,19 +703,25 @@ fn nothing_is_found_where_nothing_is_wrong() {
     assert!(outcome.found().is_none() && outcome.run.summary.settled, "a minute");
 }
 
-/// What the joints do is told from the torques that were asked for and the speeds that were read: with a motor the wrong
-/// way round, they seem to brake. docs/safety.md says so.
+/// What the joints do is told from the torques that were asked for and the turns that were counted: a motor the wrong way
+/// round looks like somebody who pushes: the potentials rise, and the excess is nothing. docs/safety.md says so.
 #[test]
 fn a_reversed_motor_is_not_seen_by_its_work() {
     let scene = scene("cube", &["duration_s=1"]);
     let mut fallen = 0;
     for joint in 0..JOINTS {
         let outcome = run(&scene, &Course { reversed_motors: vec![(500, joint)], ..Course::default() });
-        let work_j = largest(outcome.turned[500..].iter().map(|turned| f64::from(turned.energy_j)));
+        let excess_j = largest(outcome.turned[500..].iter().map(|turned| f64::from(turned.excess_j)));
         let limit_j = config(&scene).faults.energy_j.map_or(f64::INFINITY, f64::from);
-        assert!(work_j < 0.01 * limit_j, "joint {joint}: {work_j} J of {limit_j} J");
+        assert!(excess_j < 0.1 * limit_j, "joint {joint}: {excess_j} J of {limit_j} J");
         assert!(outcome.found().is_none_or(|(_, raised)| raised.fault != Fault::TooMuchEnergy));
-        fallen += usize::from(!outcome.run.summary.grasp_held);
+        if !outcome.run.summary.grasp_held {
+            fallen += 1;
+            // What is pushed against rises.
+            let potential_j = |turned: &Turned| turned.potentials_j.iter().sum::<f32>();
+            let last = outcome.turned.iter().rfind(|turned| turned.mode == Mode::Grasping).expect("it ran");
+            assert!(potential_j(last) > potential_j(&outcome.turned[499]), "joint {joint}");
+        }
     }
     // All but the abduction of the first finger, which has no torque in this grasp.
     assert_eq!(fallen, JOINTS - 1);

@@ -1,8 +1,8 @@
 //! The integrator: its order, the energy that it keeps, and that it stays stable where it is coarse.
 
 use blindgrasp::plant::contact::FingertipModel;
-use blindgrasp::plant::contact::Rows;
 use blindgrasp::plant::{Motion, Plant};
+use blindgrasp_tests::books::contact_power_w;
 use blindgrasp_tests::grasps::{DAMPING_NM_S, FINGERTIP, Grasp, Held, cube, prism};
 use blindgrasp_tests::hands::{FINGER_JOINTS, three_finger};
 use blindgrasp_tests::numeric::{Errors, order};
@@ -88,19 +88,7 @@ fn dissipation_w(grasp: &Grasp, plant: &Plant) -> f64 {
     for (k, speed) in motion.speeds_rad_s.iter().enumerate().take(hand.joint_count()) {
         power += DAMPING_NM_S[k % FINGER_JOINTS] * speed * speed;
     }
-    for (i, (contact, force)) in plant.contacts().iter().zip(plant.forces()).enumerate() {
-        power += force.torsion_nm * force.torsion_nm / contact.torsion_nm_s;
-        let object = contact.object_rows()[Rows::INDENTATION];
-        let velocities = motion.velocity_m_s.iter().chain(motion.spin_rad_s.iter());
-        let mut rate: f64 = object.iter().zip(velocities).map(|(row, v)| row * v).sum();
-        for k in hand.joints_to(i) {
-            let row =
-                contact.joint_rows(plant.posture(), &plant.posture().centres_m[i], k)[Rows::INDENTATION];
-            rate += row * motion.speeds_rad_s[k];
-        }
-        power += contact.damping_n_s_m * rate * rate;
-    }
-    power
+    power + contact_power_w(plant)
 }
 
 /// What a run does to the energy.

@@ -87,7 +87,7 @@ fn its_self_test_can_fail() {
         ("\"why\":\"TooShort\"", "\"why\":\"BadCrc\""),
         ("\"digest\":null", "\"digest\":7"),
         ("\"heard\":\"Lost\"", "\"heard\":\"NoFullRecord\""),
-        ("\"interface_version\": 3", "\"interface_version\": 2"),
+        ("\"interface_version\": 4", "\"interface_version\": 3"),
     ];
     for (from, to) in changes {
         assert!(vectors.contains(from), "{from}");

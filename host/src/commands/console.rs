@@ -31,7 +31,11 @@ const WORDS: [(&str, &str, &str); 12] = [
     ("status", "", "mode, fault, counts, torques, what limits, and what went over the line"),
     ("arm", "", "let the joints have torque: hold their weight and damp them"),
     ("disarm", "", "take the torque away"),
-    ("grasp", "[FORCE_N [STIFFNESS_NM]]", "close the hand and hold; without values, as configured"),
+    (
+        "grasp",
+        "[FORCE_N [STIFFNESS_NM [INTEGRAL_NM_RAD]]]",
+        "close the hand and hold; without values, as configured",
+    ),
     ("release", "", "let go slowly"),
     ("stop", "", "take the torque away at once; so does Ctrl-C, and a second one quits"),
     ("clear", "", "leave a fault whose cause is gone"),
@@ -298,9 +302,13 @@ impl Console {
             ("release", []) => Command::Release,
             ("stop", []) => Command::Stop,
             ("clear", []) => Command::ClearFault,
-            ("grasp", [] | [_] | [_, _]) => {
+            ("grasp", [] | [_] | [_, _] | [_, _, _]) => {
                 let value = |at: usize| rest.get(at).map(|word| number(word)).transpose();
-                Command::Grasp(Grasp { force_n: value(0)?, attitude_stiffness_nm: value(1)? })
+                Command::Grasp(Grasp {
+                    force_n: value(0)?,
+                    attitude_stiffness_nm: value(1)?,
+                    integral_gain_nm_rad: value(2)?,
+                })
             }
             ("help", []) => {
                 for (word, values, words) in WORDS {
@@ -516,8 +524,15 @@ impl Console {
         if let Some(raised) = record.reading_failed {
             row("joints", format!("not read: {raised}"));
         }
-        row("grasp", format!("{} N, {} N m", record.force_n, record.attitude_stiffness_nm));
-        row("energy", format!("{:.6} J", record.energy_j));
+        let Record { force_n, attitude_stiffness_nm, integral_gain_nm_rad, .. } = record;
+        row("grasp", format!("{force_n} N, {attitude_stiffness_nm} N m, {integral_gain_nm_rad} N m/rad"));
+        row(
+            "energy",
+            format!(
+                "work {:.6} J, damped {:.6} J, excess {:.6} J",
+                record.work_j, record.damped_j, record.excess_j
+            ),
+        );
         row("cycles", record.cycles.to_string());
         row("lost", format!("{} records and answers", record.dropped));
         row("link", self.talk.traffic().to_string());

@@ -149,22 +149,25 @@ pub enum Plot {
     Stiffness,
     /// Potentials of the grasp law.
     Potentials,
-    /// Work of the joints.
-    Energy,
+    /// Work of the motors and of the damping.
+    Work,
+    /// Work beyond the law's.
+    Excess,
     /// Time of a tick.
     Cycles,
 }
 
 impl Plot {
     /// Every plot.
-    pub const ALL: [Self; 8] = [
+    pub const ALL: [Self; 9] = [
         Self::Torques,
         Self::Angles,
         Self::Speeds,
         Self::Force,
         Self::Stiffness,
         Self::Potentials,
-        Self::Energy,
+        Self::Work,
+        Self::Excess,
         Self::Cycles,
     ];
 
@@ -176,9 +179,19 @@ impl Plot {
             Self::Speeds => "speeds, rad/s",
             Self::Force => "grasping force, N",
             Self::Stiffness => "attitude stiffness, N m",
-            Self::Potentials => "potentials of approach and attitudes, J",
-            Self::Energy => "work of the last second, J",
+            Self::Potentials => "potentials of the law, J",
+            Self::Work => "work since the grasp began, J",
+            Self::Excess => "work of the last second beyond the potentials, J",
             Self::Cycles => "cycles of a tick",
+        }
+    }
+
+    /// Names of the signals that are drawn together, where they are not joints'.
+    pub const fn signals(self) -> &'static [&'static str] {
+        match self {
+            Self::Potentials => &["approach", "attitudes", "integral"],
+            Self::Work => &["motors", "damping"],
+            _ => &[],
         }
     }
 
@@ -191,10 +204,11 @@ impl Plot {
 /// Signals of the history that are not of joints, in their order; those of the joints follow, plot by plot.
 const FORCE: usize = 0;
 const STIFFNESS: usize = 1;
-const POTENTIALS: [usize; 2] = [2, 3];
-const ENERGY: usize = 4;
-const CYCLES: usize = 5;
-const SCALARS: usize = 6;
+const POTENTIALS: [usize; 3] = [2, 3, 4];
+const WORK: [usize; 2] = [5, 6];
+const EXCESS: usize = 7;
+const CYCLES: usize = 8;
+const SCALARS: usize = 9;
 
 /// What is known of a hand.
 #[derive(Clone, Debug)]
@@ -353,7 +367,10 @@ impl Model {
             record.attitude_stiffness_nm,
             record.approach_potential_j,
             record.attitude_potential_j,
-            record.energy_j,
+            record.integral_potential_j,
+            record.work_j,
+            record.damped_j,
+            record.excess_j,
             record.cycles as f32,
         ];
         let joints: Vec<Joint<'_>> = self.joints().collect();
@@ -536,7 +553,8 @@ impl Model {
             Plot::Force => vec![FORCE],
             Plot::Stiffness => vec![STIFFNESS],
             Plot::Potentials => POTENTIALS.to_vec(),
-            Plot::Energy => vec![ENERGY],
+            Plot::Work => WORK.to_vec(),
+            Plot::Excess => vec![EXCESS],
             Plot::Cycles => vec![CYCLES],
         };
         signals.iter().map(|&signal| self.history.columns(signal, until, window, columns)).collect()
@@ -704,7 +722,7 @@ pub(super) mod tests {
         assert!(first.is_some() && (second.most - at(999.0)).abs() < 1e-4, "{second:?}");
         for plot in Plot::ALL {
             let count = model.plotted(plot, Some(0), ms(1000), ms(1000), 3).len();
-            assert_eq!(count, if plot == Plot::Potentials { 2 } else { 1 }, "{plot:?}");
+            assert_eq!(count, plot.signals().len().max(1), "{plot:?}");
         }
     }
 }

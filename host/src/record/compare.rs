@@ -186,13 +186,17 @@ fn words(record: &Record) -> [(&'static str, String); 13] {
 }
 
 /// What of a record is a real number, but for the torques.
-fn numbers(record: &Record) -> [(&'static str, f32); 5] {
+fn numbers(record: &Record) -> [(&'static str, f32); 9] {
     [
         ("force, N,", record.force_n),
         ("attitude stiffness, N m,", record.attitude_stiffness_nm),
+        ("integral gain, N m/rad,", record.integral_gain_nm_rad),
         ("approach potential, J,", record.approach_potential_j),
         ("attitude potential, J,", record.attitude_potential_j),
-        ("energy, J,", record.energy_j),
+        ("integral potential, J,", record.integral_potential_j),
+        ("work, J,", record.work_j),
+        ("damped, J,", record.damped_j),
+        ("excess, J,", record.excess_j),
     ]
 }
 
@@ -269,7 +273,7 @@ mod tests {
             ("sequence", |t| t.record.sequence += 1),
             ("counts", |t| t.record.counts = List::first_of([1; crate::MAX_JOINTS], 3)),
             ("number of torques", |t| t.record.torques_nm = List::default()),
-            ("energy, J,", |t| t.record.energy_j = 1e-30),
+            ("excess, J,", |t| t.record.excess_j = 1e-30),
             ("answer to the request", |t| t.answer = Some(Answer::Refused(Refusal::Busy))),
         ];
         for (what, change) in changes {

@@ -128,6 +128,7 @@ pub(super) fn control(control: &Control) -> Result<()> {
     }
     within("control.force_n", control.force_n, 1e-6, 1e4)?;
     within("control.attitude_stiffness_nm", control.attitude_stiffness_nm, 0.0, 1e4)?;
+    within("control.integral_gain_nm_rad", control.integral_gain_nm_rad, 0.0, 1e4)?;
     within("control.damping_scale", control.damping_scale, 0.0, 1e4)?;
     within("control.soft_start_s", control.soft_start_s, 0.0, LONGEST_RUN_S)?;
     // The tick's own bounds, so that the file and the key are named here.

@@ -36,8 +36,10 @@ const FROZEN_SHARE: f64 = 0.05;
 /// radian and more. Of 155 such pushes that the grasp survives, these two numbers mistake 2 for a frozen counter; a share
 /// of 0.02 and 0.03 rad mistook one in four or five, and found fewer of the counters that really were frozen.
 const FROZEN_NEIGHBOUR_RAD: f64 = 0.1;
-/// The work of a second is at most that of all torque limits over this angle, rad.
-const ENERGY_TRAVEL_RAD: f64 = 0.1;
+/// What the joints do in a second beyond the law's potentials is at most the work of all torque limits over this angle, rad:
+/// 50 mJ for the three-fingered hand, what a stretched finger has at 9 rad/s. Hands that hold, pushed ones included, stay
+/// below a fiftieth of that (`tests/tests/ledger.rs`); hands that ring after a hard touch, and then hold, below two thirds.
+const ENERGY_TRAVEL_RAD: f64 = 3e-3;
 /// How long letting go takes, ms.
 const RELEASE_MS: u32 = 300;
 
@@ -58,6 +60,7 @@ impl Setup<'_> {
         GraspConfig {
             force_n: T::from_f64(self.control.force_n),
             attitude_stiffness_nm: T::from_f64(self.control.attitude_stiffness_nm),
+            integral_gain_nm_rad: T::from_f64(self.control.integral_gain_nm_rad),
             damping_nm_s: self.each(|joint| self.damping_nm_s(joint)),
             gravity_m_s2: self.control.gravity_compensation.then(gravity),
         }
@@ -88,6 +91,7 @@ impl Setup<'_> {
             limits: LimitConfig {
                 force_n: limited.then_some((FIRMEST * control.force_n) as f32),
                 attitude_stiffness_nm: limited.then_some((FIRMEST * control.attitude_stiffness_nm) as f32),
+                integral_gain_nm_rad: limited.then_some((FIRMEST * control.integral_gain_nm_rad) as f32),
                 torque_nm: limited.then(|| self.each(|joint| joint.torque_limit_nm)),
                 slew_nm_s: match actuators.slew_limit_nm_s {
                     Some(limit) => Some(self.each(|_| limit)),

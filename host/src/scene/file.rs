@@ -150,7 +150,7 @@ impl<'de> Deserialize<'de> for Indentation {
     }
 }
 
-/// The controller: Eqs. 29-34 and what surrounds them. The damping gains are the hand's.
+/// The controller: Eqs. 29-34, the law before them, and what surrounds them. The damping gains are the hand's.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Control {
@@ -158,6 +158,10 @@ pub struct Control {
     pub force_n: f64,
     /// Stiffness `K_st` of the relative attitude constraint of Eq. 32, N m; 0 for the normal forces alone.
     pub attitude_stiffness_nm: f64,
+    /// Gain `K_I` of the earlier law's integral of each joint's velocity, N m/rad. With `attitude_stiffness_nm = 0` that law
+    /// takes the place of Eq. 32's.
+    #[serde(default)]
+    pub integral_gain_nm_rad: f64,
     /// Factor on the damping gains of the hand's joints.
     #[serde(default = "one")]
     pub damping_scale: f64,

@@ -115,11 +115,11 @@ structs! {
     impl [] Encoder<f32> as Encoder { zero_count rad_per_count reversed }
     impl [const J: usize] EstimatorConfig<f32, J> as EstimatorConfig { bandwidth_hz encoders }
     impl [const J: usize] GraspConfig<f32, J> as GraspConfig {
-        force_n attitude_stiffness_nm damping_nm_s gravity_m_s2
+        force_n attitude_stiffness_nm integral_gain_nm_rad damping_nm_s gravity_m_s2
     }
     impl [const J: usize] StopConfig<f32, J> as StopConfig { margin_rad stiffness_nm_rad damping_nm_s }
     impl [const J: usize] LimitConfig<f32, J> as LimitConfig {
-        force_n attitude_stiffness_nm torque_nm slew_nm_s stops
+        force_n attitude_stiffness_nm integral_gain_nm_rad torque_nm slew_nm_s stops
     }
     impl [const J: usize] FrozenConfig<f32, J> as FrozenConfig { torque_nm neighbour_rad after_ms }
     impl [const J: usize] FaultConfig<f32, J> as FaultConfig {

@@ -139,7 +139,7 @@ impl<C: Controller> Simulation<C> {
             ideal: scene.sensors.ideal,
             encoders: Encoders::new(scene),
             injections: Injections::default(),
-            observer: Observer::new(law(scene)?, plant.posture()),
+            observer: Observer::new(law(scene)?, &plant),
             controller,
             plant,
         })

@@ -4,11 +4,11 @@
 //! Departure from the print: the elastic part of the energy is `sum(P_i)` of Eq. 18, not the `dP` of Eq. 46. What Eq. 46
 //! takes away, a constant force times the indentation, changes as the fingertips roll, so that with it Eq. 39 would not
 //! hold; with Eq. 18 it does, as the inner product that the paper takes shows. The constant `3 N K_st` is added, so that
-//! no term is negative.
+//! no term is negative. Where the earlier law's `u_I` acts, its potential belongs to the energy too.
 
-use crate::plant::Plant;
+use crate::plant::{Motion, Plant};
 use crate::record::sample::{ContactSample, Sample};
-use crate::{Hand, MAX_FINGERS, MAX_JOINTS, Posture};
+use crate::{Hand, MAX_FINGERS, MAX_JOINTS};
 use blindgrasp_shared::control::{GraspLaw, Latch};
 use nalgebra::Vector3;
 
@@ -16,7 +16,7 @@ use nalgebra::Vector3;
 #[derive(Clone, Debug)]
 pub struct Observer {
     law: GraspLaw<f64, MAX_JOINTS>,
-    latch: Latch<f64, MAX_FINGERS>,
+    latch: Latch<f64, MAX_JOINTS, MAX_FINGERS>,
 }
 
 /// What the controller says about the tick that is observed.
@@ -35,20 +35,22 @@ pub struct Seen<'a> {
 }
 
 impl Observer {
-    /// Observes a law whose latch closes in a posture.
-    pub fn new(law: GraspLaw<f64, MAX_JOINTS>, start: &Posture) -> Self {
-        Self { law, latch: Latch::of(start) }
+    /// Observes a law whose latch closes where a plant is.
+    pub fn new(law: GraspLaw<f64, MAX_JOINTS>, start: &Plant) -> Self {
+        Self { law, latch: Latch::of(start.posture(), &start.motion().angles_rad) }
     }
 
     /// Energy `E = K + V + sum(P_i)` (Eq. 40), J: of the whole law, also while its force is still growing.
     pub fn energy_j(&self, plant: &Plant) -> f64 {
         let grip = self.law.grip(&self.latch);
-        let speeds = &plant.motion().speeds_rad_s;
-        let (_, monitor) = self.law.torques(&plant.model().hand, plant.posture(), speeds, Some(grip));
+        let Motion { angles_rad, speeds_rad_s, .. } = plant.motion();
+        let (_, monitor) =
+            self.law.torques(&plant.model().hand, plant.posture(), angles_rad, speeds_rad_s, Some(grip));
         plant.kinetic_energy_j()
             + plant.elastic_energy_j()
             + monitor.approach_potential_j
             + monitor.attitude_potential_j
+            + monitor.integral_potential_j
     }
 
     /// The plant at this instant, after its velocities were solved for.

@@ -62,6 +62,7 @@ fn a_run_is_that_of_a_simulation() {
         "sensors.noise_counts=0.4",
         "control.force_n=30",
         "control.attitude_stiffness_nm=1e-3",
+        "control.integral_gain_nm_rad=0.01",
         "control.damping_scale=1.5",
         "control.soft_start_s=0.1",
         "control.estimator_bandwidth_hz=70",

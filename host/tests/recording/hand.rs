@@ -95,7 +95,13 @@ impl Hand {
         record.attitude_stiffness_nm = float(0.01);
         record.approach_potential_j = float(1.0);
         record.attitude_potential_j = float(1.0);
-        record.energy_j = float(1.0);
+        record.work_j = float(1.0);
+        record.damped_j = float(1.0);
+        record.excess_j = float(1.0);
+        if limited {
+            record.integral_gain_nm_rad = float(0.1);
+            record.integral_potential_j = float(1.0);
+        }
         let mut torques = [0.0; MAX_JOINTS];
         torques[..self.joints].iter_mut().for_each(|torque| *torque = float(3.0));
         record.torques_nm = List::first_of(torques, self.joints);

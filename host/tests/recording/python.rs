@@ -42,7 +42,11 @@ fn compare(told: &Value, ours: &Decoded, joint_names: &[String]) {
         ("attitude_stiffness_nm", record.attitude_stiffness_nm),
         ("approach_potential_j", record.approach_potential_j),
         ("attitude_potential_j", record.attitude_potential_j),
-        ("energy_j", record.energy_j),
+        ("integral_gain_nm_rad", record.integral_gain_nm_rad),
+        ("integral_potential_j", record.integral_potential_j),
+        ("work_j", record.work_j),
+        ("damped_j", record.damped_j),
+        ("excess_j", record.excess_j),
     ];
     for (name, ours) in floats {
         assert!(same(&told[name], ours), "{name}: {told}, {ours}");
@@ -141,10 +145,10 @@ fn python_reads_the_same_values() {
             told["signals"]["tick"].as_array().unwrap().iter().find(|row| row["name"] == name).unwrap()["unit"].clone()
         };
         assert_eq!(units("force_n"), "N");
-        assert_eq!(units("energy_j"), "J");
+        assert_eq!(units("excess_j"), "J");
         assert_eq!(units("joints.<joint>.angle_rad"), "rad");
         assert_eq!(units("joints.<joint>.torque_nm"), "N m");
-        assert_eq!(told["metadata"]["interface_version"], "3");
+        assert_eq!(told["metadata"]["interface_version"], "4");
     }
 }
 

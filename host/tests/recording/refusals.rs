@@ -2,6 +2,7 @@
 
 use crate::hand::{Hand, about};
 use blindgrasp::record::mcap::{Decoder, Recording, RecordingError, Stamp, Writer};
+use blindgrasp_shared::telemetry::INTERFACE_VERSION;
 use mcap::records::{MessageHeader, Metadata};
 use std::collections::BTreeMap;
 use std::fs::{self, File};
@@ -54,7 +55,7 @@ fn records_of_another_interface_are_not_decoded() {
     let mut writer = Writer::create(&path, false).unwrap();
     let device = writer.add_device("hand");
     let mut about = about("three-finger");
-    about.interface_version = 2;
+    about.interface_version = 3;
     writer.about(device, Stamp(0), &about).unwrap();
     let mut hand = Hand::new(12);
     let (_, payload) = hand.tick(&mut random);
@@ -66,7 +67,8 @@ fn records_of_another_interface_are_not_decoded() {
         assert_eq!(decoder.take(&entry.unwrap()), None);
     }
     let words = decoder.obstacle(0).unwrap().to_string();
-    assert!(words.contains("interface version 2") && words.contains("this program has 3"), "{words}");
+    let ours = format!("this program has {INTERFACE_VERSION}");
+    assert!(words.contains("interface version 3") && words.contains(&ours), "{words}");
 }
 
 #[test]

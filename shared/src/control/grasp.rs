@@ -1,4 +1,4 @@
-//! The grasp law `u = u_s + u_st` (Eqs. 29-34, with the desired attitudes of Eq. 59).
+//! The grasp law `u = u_s + u_st` (Eqs. 29-34, with the desired attitudes of Eq. 59), and `u_I` of the law before it.
 //!
 //! - `u_s` (Eq. 30) draws the fingertip centres together: each is pulled towards their **centroid** like by a spring,
 //!   the joints are damped, and the weight of the links is held. It presses the fingertips against whatever is
@@ -6,9 +6,11 @@
 //! - `u_st` (Eq. 32) holds the fingertips' **relative attitudes** as they were when the grasp began (the **latch**).
 //!   A fingertip can't roll on a face without turning against its neighbours, so this supplies the tangential forces
 //!   that the normal forces of `u_s` lack.
+//! - `u_I` ([`integral`](super::integral)) is what an earlier law had in place of `u_st`; its gain is zero unless the two
+//!   are to be compared.
 //!
-//! Neither knows the object. Each is the negative gradient of a potential (Eqs. 43 and 44), and the forces and moments
-//! that each puts on the fingertips sum to zero, so that a trunk feels neither.
+//! None of them knows the object. Each is the negative gradient of a potential (Eqs. 43 and 44). The forces and moments
+//! that `u_s` and `u_st` put on the fingertips sum to zero, so that a trunk feels neither.
 //!
 //! How it is computed, and where that departs from the print:
 //! - With `D_i = R_fi R_fi,ini^T`, the turn of fingertip `i` since the latch, the sum of three cross products in Eq. 32
@@ -19,6 +21,7 @@
 //! - `V_st` has the constant `3 N K_st` added, so that it is zero at the latch and never negative: the energy is then
 //!   bounded for every `K_st`, and the condition of Eq. 49 is a sizing rule only.
 
+use super::integral::pull_back;
 use crate::buffer::BufferTooSmall;
 use crate::hand::frame::{dot, product_transposed};
 use crate::hand::{Hand, Posture, Wrench};
@@ -35,6 +38,8 @@ pub struct GraspConfig<T, const J: usize> {
     pub force_n: T,
     /// Stiffness `K_st` of the relative attitudes, N m; zero grasps by normal forces alone.
     pub attitude_stiffness_nm: T,
+    /// Gain `K_I` of the earlier law's integral of each joint's velocity, N m/rad; zero leaves it out.
+    pub integral_gain_nm_rad: T,
     /// Damping `C` of each joint, N m s/rad.
     pub damping_nm_s: [T; J],
     /// Gravity in the base frame, m/s^2; `None` leaves the weight of the links uncompensated.
@@ -55,6 +60,9 @@ impl<T: Real, const J: usize> GraspConfig<T, J> {
         if !positive_or_zero(self.attitude_stiffness_nm) {
             return fail("attitude_stiffness_nm", None, "has to be zero or positive");
         }
+        if !positive_or_zero(self.integral_gain_nm_rad) {
+            return fail("integral_gain_nm_rad", None, "has to be zero or positive");
+        }
         let mut damping = self.damping_nm_s.iter().take(hand.joint_count());
         if let Some(joint) = damping.position(|&c| !positive_or_zero(c)) {
             return fail("damping_nm_s", Some(joint), "has to be zero or positive");
@@ -64,9 +72,12 @@ impl<T: Real, const J: usize> GraspConfig<T, J> {
         }
         let radii = (0..hand.fingertip_count()).fold(T::zero(), |sum, i| sum + hand.radius_m(i));
         Ok(GraspLaw {
-            force_n: self.force_n,
+            gains: Gains {
+                force_n: self.force_n,
+                attitude_stiffness_nm: self.attitude_stiffness_nm,
+                integral_gain_nm_rad: self.integral_gain_nm_rad,
+            },
             per_radii_1_m: T::one() / radii,
-            attitude_stiffness_nm: self.attitude_stiffness_nm,
             damping_nm_s: self.damping_nm_s,
             gravity_m_s2: self.gravity_m_s2,
             share_of_one: T::one() / T::from_i32(hand.fingertip_count() as i32),
@@ -74,42 +85,74 @@ impl<T: Real, const J: usize> GraspConfig<T, J> {
     }
 }
 
-/// The fingertips' attitudes `R_fi,ini` when the grasp began (Eq. 59).
+/// How the hand stood when the grasp began: the fingertips' attitudes `R_fi,ini` (Eq. 59), and the joint angles.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Latch<T, const F: usize> {
+pub struct Latch<T, const J: usize, const F: usize> {
     attitudes: [Matrix3<T>; F],
+    angles_rad: [T; J],
 }
 
-impl<T: Real, const F: usize> Latch<T, F> {
-    /// Keeps the attitudes of a posture.
-    pub fn of<const J: usize>(posture: &Posture<T, J, F>) -> Self {
-        Self { attitudes: posture.attitudes }
+impl<T: Real, const J: usize, const F: usize> Latch<T, J, F> {
+    /// Keeps a posture and the joint angles, rad, that lead to it.
+    pub fn of(posture: &Posture<T, J, F>, angles_rad: &[T; J]) -> Self {
+        Self { attitudes: posture.attitudes, angles_rad: *angles_rad }
     }
 }
 
-impl<const F: usize> Latch<f32, F> {
-    pub(crate) fn save(&self, fingertips: usize, to: &mut Saver<'_>) -> Result<(), BufferTooSmall> {
-        self.attitudes.iter().take(fingertips).flatten().try_for_each(|&entry| to.f32(entry))
+impl<const J: usize, const F: usize> Latch<f32, J, F> {
+    pub(crate) fn save(
+        &self,
+        joints: usize,
+        fingertips: usize,
+        to: &mut Saver<'_>,
+    ) -> Result<(), BufferTooSmall> {
+        self.attitudes.iter().take(fingertips).flatten().try_for_each(|&entry| to.f32(entry))?;
+        self.angles_rad.iter().take(joints).try_for_each(|&angle| to.f32(angle))
     }
 
-    pub(crate) fn load(fingertips: usize, from: &mut Loader<'_>) -> Result<Self, SnapshotError> {
+    pub(crate) fn load(
+        joints: usize,
+        fingertips: usize,
+        from: &mut Loader<'_>,
+    ) -> Result<Self, SnapshotError> {
         let mut attitudes = [Matrix3::identity(); F];
         for entry in attitudes.iter_mut().take(fingertips).flatten() {
             *entry = from.f32()?;
         }
-        Ok(Self { attitudes })
+        let mut angles_rad = [0.0; J];
+        for angle in angles_rad.iter_mut().take(joints) {
+            *angle = from.f32()?;
+        }
+        Ok(Self { attitudes, angles_rad })
     }
 }
 
-/// How firmly the law grasps in this tick.
-#[derive(Clone, Copy, Debug)]
-pub struct Grip<'a, T, const F: usize> {
-    /// Attitudes to hold.
-    pub latch: &'a Latch<T, F>,
-    /// The force `f_d` that acts, N; it begins small, so that the fingers do not hammer the object.
+/// How firmly the law grasps.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Gains<T> {
+    /// The force `f_d`, N; it begins small, so that the fingers do not hammer the object.
     pub force_n: T,
-    /// The stiffness `K_st` that acts, N m.
+    /// The stiffness `K_st`, N m.
     pub attitude_stiffness_nm: T,
+    /// The gain `K_I`, N m/rad.
+    pub integral_gain_nm_rad: T,
+}
+
+impl<T: Real> Gains<T> {
+    /// No grasp.
+    pub fn none() -> Self {
+        let zero = T::zero();
+        Self { force_n: zero, attitude_stiffness_nm: zero, integral_gain_nm_rad: zero }
+    }
+}
+
+/// A grasp, as it is in this tick.
+#[derive(Clone, Copy, Debug)]
+pub struct Grip<'a, T, const J: usize, const F: usize> {
+    /// How the hand stood when it began.
+    pub latch: &'a Latch<T, J, F>,
+    /// The gains that act.
+    pub gains: Gains<T>,
 }
 
 /// What the law knows about itself without seeing the object.
@@ -119,17 +162,32 @@ pub struct Monitor<T> {
     pub approach_potential_j: T,
     /// Potential `V_st` of the relative attitudes (Eq. 44) above its least value, J.
     pub attitude_potential_j: T,
+    /// Potential `V_I` of the joints' turns since the latch, J.
+    pub integral_potential_j: T,
+    /// Potential energy of the links' weight that the law holds, above some level, J; zero where it holds none.
+    pub weight_potential_j: T,
+}
+
+impl<T: Real> Monitor<T> {
+    /// Nothing acts.
+    pub fn none() -> Self {
+        let zero = T::zero();
+        Self {
+            approach_potential_j: zero,
+            attitude_potential_j: zero,
+            integral_potential_j: zero,
+            weight_potential_j: zero,
+        }
+    }
 }
 
 /// The grasp law, prepared for one hand.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct GraspLaw<T, const J: usize> {
-    /// `f_d`, N.
-    force_n: T,
+    /// In full.
+    gains: Gains<T>,
     /// `1 / sum(r_i)`, 1/m.
     per_radii_1_m: T,
-    /// `K_st`, N m.
-    attitude_stiffness_nm: T,
     /// `C`, N m s/rad.
     damping_nm_s: [T; J],
     gravity_m_s2: Option<Vector3<T>>,
@@ -140,43 +198,45 @@ pub struct GraspLaw<T, const J: usize> {
 impl<T: Real, const J: usize> GraspLaw<T, J> {
     /// `A = f_d / sum(r_i)` (Eq. 38), N/m.
     pub fn approach_stiffness_n_m(&self) -> T {
-        self.force_n * self.per_radii_1_m
+        self.gains.force_n * self.per_radii_1_m
     }
 
-    /// `f_d` at full force, N.
-    pub fn force_n(&self) -> T {
-        self.force_n
-    }
-
-    /// `K_st`, N m.
-    pub fn attitude_stiffness_nm(&self) -> T {
-        self.attitude_stiffness_nm
+    /// The gains, in full.
+    pub fn gains(&self) -> &Gains<T> {
+        &self.gains
     }
 
     /// The whole grip, as configured.
-    pub fn grip<'a, const F: usize>(&self, latch: &'a Latch<T, F>) -> Grip<'a, T, F> {
-        Grip { latch, force_n: self.force_n, attitude_stiffness_nm: self.attitude_stiffness_nm }
+    pub fn grip<'a, const F: usize>(&self, latch: &'a Latch<T, J, F>) -> Grip<'a, T, J, F> {
+        Grip { latch, gains: self.gains }
     }
 
-    /// Joint torques `u` (Eq. 29), N m, and what the law knows of itself. Without a grip the joints are only damped
-    /// and their weight held.
+    /// Power that the damping takes, `dq^T C dq`, W.
+    pub fn damping_power_w(&self, speeds_rad_s: &[T; J]) -> T {
+        let joints = self.damping_nm_s.iter().zip(speeds_rad_s);
+        joints.fold(T::zero(), |sum, (damping, speed)| sum + *damping * *speed * *speed)
+    }
+
+    /// Joint torques `u` (Eq. 29, and `u_I`), N m, and what the law knows of itself. The posture is that of the angles,
+    /// rad. Without a grip the joints are only damped and their weight held.
     pub fn torques<const F: usize>(
         &self,
         hand: &Hand<T, J, F>,
         posture: &Posture<T, J, F>,
+        angles_rad: &[T; J],
         speeds_rad_s: &[T; J],
-        grip: Option<Grip<'_, T, F>>,
+        grip: Option<Grip<'_, T, J, F>>,
     ) -> ([T; J], Monitor<T>) {
         let mut torques = core::array::from_fn(|k| -(self.damping_nm_s[k] * speeds_rad_s[k]));
-        let mut monitor = Monitor { approach_potential_j: T::zero(), attitude_potential_j: T::zero() };
-        if let Some(grip) = grip {
-            let (moments_nm, potential_j) = if grip.attitude_stiffness_nm > T::zero() {
-                hold_attitudes(hand, posture, grip.latch, grip.attitude_stiffness_nm)
+        let mut monitor = Monitor::none();
+        if let Some(Grip { latch, gains }) = grip {
+            let (moments_nm, potential_j) = if gains.attitude_stiffness_nm > T::zero() {
+                hold_attitudes(hand, posture, latch, gains.attitude_stiffness_nm)
             } else {
                 ([Vector3::zeros(); F], T::zero())
             };
             monitor.attitude_potential_j = potential_j;
-            let stiffness = grip.force_n * self.per_radii_1_m;
+            let stiffness = gains.force_n * self.per_radii_1_m;
             let mut squares = T::zero();
             for (i, (away, moment_nm)) in self.centroid_offsets(hand, posture).zip(moments_nm).enumerate() {
                 squares += dot(&away, &away);
@@ -184,9 +244,13 @@ impl<T: Real, const J: usize> GraspLaw<T, J> {
                 hand.push_fingertip(posture, i, &wrench, &mut torques);
             }
             monitor.approach_potential_j = squares * stiffness * T::from_f64(0.5);
+            if gains.integral_gain_nm_rad > T::zero() {
+                monitor.integral_potential_j =
+                    pull_back(gains.integral_gain_nm_rad, &latch.angles_rad, angles_rad, &mut torques);
+            }
         }
         if let Some(gravity) = &self.gravity_m_s2 {
-            hand.hold_weight(posture, gravity, &mut torques);
+            monitor.weight_potential_j = hand.hold_weight(posture, gravity, &mut torques);
         }
         (torques, monitor)
     }
@@ -209,9 +273,9 @@ impl<T: Real, const J: usize> GraspLaw<T, J> {
         &self,
         hand: &Hand<T, J, F>,
         posture: &Posture<T, J, F>,
-        latch: &Latch<T, F>,
+        latch: &Latch<T, J, F>,
     ) -> [Wrench<T>; F] {
-        let (moments_nm, _) = hold_attitudes(hand, posture, latch, self.attitude_stiffness_nm);
+        let (moments_nm, _) = hold_attitudes(hand, posture, latch, self.gains.attitude_stiffness_nm);
         moments_nm.map(|moment_nm| Wrench { force_n: Vector3::zeros(), moment_nm })
     }
 
@@ -232,7 +296,7 @@ impl<T: Real, const J: usize> GraspLaw<T, J> {
 fn hold_attitudes<T: Real, const J: usize, const F: usize>(
     hand: &Hand<T, J, F>,
     posture: &Posture<T, J, F>,
-    latch: &Latch<T, F>,
+    latch: &Latch<T, J, F>,
     stiffness_nm: T,
 ) -> ([Vector3<T>; F], T) {
     // How far each fingertip turned since the latch, D_i.

@@ -1,7 +1,8 @@
 //! Control laws: joint angles and speeds in, joint torques out, nothing known of the object.
 //!
-//! Each law is its own file. The paper's is [`grasp`].
+//! The paper's law is [`grasp`]; [`integral`] is what an earlier one had in place of one of its terms.
 
 pub mod grasp;
+pub mod integral;
 
-pub use grasp::{GraspConfig, GraspLaw, Grip, Latch, Monitor};
+pub use grasp::{Gains, GraspConfig, GraspLaw, Grip, Latch, Monitor};

@@ -106,8 +106,8 @@ faults! {
         "a late tick counts 10, each one in time takes 1 off again: above 10 times `faults.late_ticks`",
         "report the record; choose a longer period";
     TooMuchEnergy    = 12, TorqueOff, "joints put more energy into the world than they may",
-        "as soon as the work of the last second (fading) is above `faults.energy_j`; the work is reckoned from torques and estimated speeds, so a motor with the wrong sign looks like a brake",
-        "look for what lets the joints run on: a lost object, an encoder of the wrong scale; lower the force";
+        "in the tick in which the work of the last second (fading) is above the drop of the law's potentials by more than `faults.energy_j`: a swing that is fed by delays or limits. The work is reckoned from the torques that are asked for and the turns that are counted, so that a motor or an encoder the wrong way round looks like somebody who pushes",
+        "lower the force or raise the damping; look for joints whose limits cut off what the law asks for";
 }
 
 impl From<Fault> for u8 {

@@ -28,7 +28,8 @@ pub struct FaultConfig<T, const J: usize> {
     pub heartbeat_ms: Option<u32>,
     /// How many ticks in a row may be late; on average one in ten.
     pub late_ticks: Option<u32>,
-    /// Work that the joints may do in a second (fading: of what was done a second ago, 1/e counts), J.
+    /// Work that the joints may do in a second beyond the drop of the law's potentials, J (the excess of the
+    /// [`ledger`](crate::ledger), which fades: of what was done a second ago, 1/e counts).
     pub energy_j: Option<T>,
 }
 
@@ -135,7 +136,6 @@ impl<T: Real, const J: usize> FaultConfig<T, J> {
             late_most: self.late_ticks.map(|ticks| ticks * LATE_WEIGHT),
             neighbour_rad: self.frozen.map_or(T::zero(), |frozen| frozen.neighbour_rad),
             energy_j: self.energy_j,
-            period_s: period.seconds(),
         })
     }
 }
@@ -156,7 +156,6 @@ pub struct Watch<T, const J: usize> {
     neighbour_rad: T,
     late_most: Option<u32>,
     energy_j: Option<T>,
-    period_s: T,
 }
 
 /// What the watch remembers from tick to tick.
@@ -171,8 +170,6 @@ pub struct Watched<T, const J: usize> {
     late: u32,
     /// Late ticks since the start.
     late_ticks: u32,
-    /// Work of the last second, J.
-    energy_j: T,
 }
 
 /// For how long a counter has stood still.
@@ -215,18 +212,12 @@ impl<T: Real, const J: usize> Watched<T, J> {
             silent: u32::MAX,
             late: 0,
             late_ticks: 0,
-            energy_j: T::zero(),
         }
     }
 
     /// Ticks that were late since the start.
     pub fn late_ticks(&self) -> u32 {
         self.late_ticks
-    }
-
-    /// Work of the joints in the last second, J; what was done earlier fades.
-    pub fn energy_j(&self) -> T {
-        self.energy_j
     }
 }
 
@@ -241,8 +232,7 @@ impl<const J: usize> Watched<f32, J> {
         }
         to.u32(self.silent)?;
         to.u32(self.late)?;
-        to.u32(self.late_ticks)?;
-        to.f32(self.energy_j)
+        to.u32(self.late_ticks)
     }
 
     pub(crate) fn load(joints: usize, from: &mut Loader<'_>) -> Result<Self, SnapshotError> {
@@ -260,7 +250,6 @@ impl<const J: usize> Watched<f32, J> {
         watched.silent = from.u32()?;
         watched.late = from.u32()?;
         watched.late_ticks = from.u32()?;
-        watched.energy_j = from.f32()?;
         Ok(watched)
     }
 }
@@ -324,21 +313,10 @@ impl<T: Real, const J: usize> Watch<T, J> {
         (watched.late > most).then_some(Raised::of_hand(Fault::TickLate))
     }
 
-    /// Adds up the work of `torques_nm` in the last tick.
-    pub fn energy(
-        &self,
-        watched: &mut Watched<T, J>,
-        motion: &Motion<T, J>,
-        torques_nm: &[T; J],
-    ) -> Option<Raised> {
-        let mut power_w = T::zero();
-        for (torque, speed) in torques_nm.iter().zip(&motion.speeds_rad_s).take(self.joint_count) {
-            power_w += *torque * *speed;
-        }
-        // A first-order fade with a time constant of one second.
-        watched.energy_j += (power_w - watched.energy_j) * self.period_s;
+    /// Whether the ledger's excess is more than it may be.
+    pub fn energy(&self, excess_j: T) -> Option<Raised> {
         let most = self.energy_j?;
-        (watched.energy_j > most).then_some(Raised::of_hand(Fault::TooMuchEnergy))
+        (!(excess_j <= most)).then_some(Raised::of_hand(Fault::TooMuchEnergy))
     }
 
     /// Looks for counters that stand still although their torque and a neighbour changed since they last moved.
@@ -412,7 +390,6 @@ mod tests {
         heartbeat_ticks: None,
         late_most: None,
         energy_j: None,
-        period_s: 1e-3,
     };
 
     #[test]
@@ -489,17 +466,12 @@ mod tests {
     }
 
     #[test]
-    fn energy_is_the_work_of_the_last_second() {
+    fn too_much_energy_is_above_its_limit_or_no_number() {
         let watch = Watch { energy_j: Some(0.5), ..BLIND };
-        let mut watched = Watched::new();
-        let motion = Motion { speeds_rad_s: [2.0, -1.0], ..Motion::still() };
-        // 1 W: after a second 1 - 1/e J, after ln(2) s half a joule.
-        let found = (1..2000).find(|_| watch.energy(&mut watched, &motion, &[0.4, -0.2]).is_some());
-        assert_eq!(found, Some(693));
-        assert!(watched.energy_j() > 0.5 && watched.energy_j() < 0.501);
-        // Braking takes it back.
-        assert_eq!(watch.energy(&mut watched, &motion, &[-4.0, 0.0]), None);
-        assert_eq!(BLIND.energy(&mut watched, &motion, &[1e9, 0.0]), None);
+        let found = Some(Raised::of_hand(Fault::TooMuchEnergy));
+        assert_eq!([-9.0, 0.5].map(|excess_j| watch.energy(excess_j)), [None; 2]);
+        assert_eq!([0.501, f64::NAN].map(|excess_j| watch.energy(excess_j)), [found; 2]);
+        assert_eq!(BLIND.energy(1e9), None);
     }
 
     #[test]

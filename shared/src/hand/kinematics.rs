@@ -222,18 +222,20 @@ impl<T: Real, const J: usize, const F: usize> Hand<T, J, F> {
     }
 
     /// Adds the joint torques that hold the weight of the links: one pass from the fingertips to the base, which sums up
-    /// the first moments of the augmented bodies above each joint.
+    /// the first moments of the augmented bodies above each joint. Returns the potential energy of the weight, J, above
+    /// what it would be with all mass at the joints that stand on the base.
     #[inline]
     pub(crate) fn hold_weight(
         &self,
         posture: &Posture<T, J, F>,
         gravity_m_s2: &Vector3<T>,
         torques: &mut [T; J],
-    ) {
+    ) -> T {
         let upwards = -gravity_m_s2;
         // In the axes of each joint's chain.
         let mut moments: [Vector3<T>; J] =
             core::array::from_fn(|k| posture.joints[k].turned(&self.joints[k].first_moment_kg_m));
+        let mut potential_j = T::zero();
         let mut end = self.joint_count.min(J);
         while let Some((_, axes)) = end.checked_sub(1).and_then(|last| posture.at(last)) {
             let (x, y) = (dot(&x_axis(axes), &upwards), dot(&y_axis(axes), &upwards));
@@ -245,12 +247,19 @@ impl<T: Real, const J: usize, const F: usize> Hand<T, J, F> {
                 let joint = &self.joints[k];
                 if let Some(bend) = &joint.bend {
                     let parent = joint.parent.unwrap_or(J);
-                    if let (Some(pose), Some(below)) = (posture.joints.get(parent), moments.get_mut(parent)) {
-                        *below += bend.after(pose.sine, pose.cosine).into_old(&moment);
+                    match (posture.joints.get(parent), moments.get_mut(parent)) {
+                        (Some(pose), Some(below)) => {
+                            *below += bend.after(pose.sine, pose.cosine).into_old(&moment);
+                        }
+                        _ => {
+                            potential_j +=
+                                moment.x * x + moment.y * y + moment.z * dot(&z_axis(axes), &upwards);
+                        }
                     }
                     break;
                 }
             }
         }
+        potential_j
     }
 }

@@ -44,9 +44,9 @@ impl<const J: usize> Sender<J> {
         record.keep(signals);
         match self.encoder.next(&record, signals) {
             None => encode(&Reply::Record(record), buffer),
-            Some(nibbles) => {
+            Some(shape) => {
                 let mut writer = Writer::new(buffer);
-                dense::write(&record, nibbles, |byte| writer.push(byte)).map_err(|_| BufferTooSmall)?;
+                dense::write(&record, shape, |byte| writer.push(byte)).map_err(|_| BufferTooSmall)?;
                 writer.finish().map_err(|_| BufferTooSmall)
             }
         }

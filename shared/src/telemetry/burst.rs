@@ -1,6 +1,6 @@
 //! The records around a fault, at full rate, whatever the telemetry sends.
 
-use super::{List, Record};
+use super::{LAW, List, Record};
 use crate::command::{Answer, Command, Grasp, Refusal};
 use crate::event::Events;
 use crate::fault::{Fault, Raised};
@@ -63,7 +63,7 @@ struct Slot<const J: usize> {
     reading_failed: Mark,
     command: Command,
     answer: u8,
-    law: [f32; 5],
+    law: [f32; LAW],
     cycles: u32,
     late_ticks: u32,
     dropped: u32,
@@ -86,7 +86,7 @@ impl<const J: usize> Slot<J> {
         reading_failed: Mark::NONE,
         command: Command::Grasp(Grasp::CONFIGURED),
         answer: NO_ANSWER,
-        law: [0.0; 5],
+        law: [0.0; LAW],
         cycles: 0,
         late_ticks: 0,
         dropped: 0,
@@ -108,13 +108,7 @@ impl<const J: usize> Slot<J> {
                 Some(Answer { refused: None, .. }) => DONE,
                 Some(Answer { refused: Some(refusal), .. }) => REFUSED + refusal as u8,
             },
-            law: [
-                record.force_n,
-                record.attitude_stiffness_nm,
-                record.approach_potential_j,
-                record.attitude_potential_j,
-                record.energy_j,
-            ],
+            law: record.law(),
             cycles: record.cycles,
             late_ticks: record.late_ticks,
             dropped: record.dropped,
@@ -126,7 +120,6 @@ impl<const J: usize> Slot<J> {
 
     /// Numbered by its tick: it is one of all of them.
     fn record(&self) -> Record<f32, J> {
-        let [force_n, attitude_stiffness_nm, approach_potential_j, attitude_potential_j, energy_j] = self.law;
         let refused =
             self.answer.checked_sub(REFUSED).and_then(|k| Refusal::ALL.get(usize::from(k))).copied();
         Record {
@@ -137,11 +130,6 @@ impl<const J: usize> Slot<J> {
             answer: (self.answer != NO_ANSWER).then_some(Answer { command: self.command, refused }),
             events: self.events,
             reading_failed: self.reading_failed.raised(),
-            force_n,
-            attitude_stiffness_nm,
-            approach_potential_j,
-            attitude_potential_j,
-            energy_j,
             cycles: self.cycles,
             late_ticks: self.late_ticks,
             dropped: self.dropped,
@@ -149,7 +137,9 @@ impl<const J: usize> Slot<J> {
             counts: self.counts,
             torques_nm: self.torques_nm,
             limiting: self.limiting,
+            ..Record::BLANK
         }
+        .with_law(self.law)
     }
 }
 
@@ -260,7 +250,8 @@ mod tests {
                 fault: Fault::ALL.get(tick as usize % 20).map(|&fault| Raised::at(tick as usize % 3, fault)),
                 reading_failed: (tick % 2 == 0).then_some(Raised::of_hand(Fault::OutputFailed)),
                 force_n: 5.0,
-                energy_j: -1e-9,
+                work_j: -1e-9,
+                excess_j: 1e-3,
                 cycles: 123,
                 late_ticks: 4,
                 dropped: 5,

@@ -26,7 +26,10 @@ use serde::{Deserialize, Serialize};
 
 /// Version of everything that goes over the wire. Two ends talk when theirs are equal; it has nothing to do with the
 /// release's version.
-pub const INTERFACE_VERSION: u16 = 3;
+pub const INTERFACE_VERSION: u16 = 4;
+
+/// How many numbers of a record are what the law and the ledger tell.
+pub(crate) const LAW: usize = 9;
 
 /// What one tick took in, decided and put out.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -51,12 +54,20 @@ pub struct Record<T, const J: usize> {
     pub force_n: T,
     /// The attitude stiffness `K_st` that acts in this tick, N m.
     pub attitude_stiffness_nm: T,
+    /// The gain `K_I` of the earlier law that acts in this tick, N m/rad.
+    pub integral_gain_nm_rad: T,
     /// Potential `V_s` of the approach, J.
     pub approach_potential_j: T,
     /// Potential `V_st` of the attitudes, above its least value, J.
     pub attitude_potential_j: T,
-    /// Work of the joints in the last second (fading), J.
-    pub energy_j: T,
+    /// Potential `V_I` of the joints' turns since the grasp began, J.
+    pub integral_potential_j: T,
+    /// Work of the motors since the last grasp began, J.
+    pub work_j: T,
+    /// What the law's damping has taken in the same time, J.
+    pub damped_j: T,
+    /// Work of the motors beyond the drop of the law's potentials in the last second (fading), J.
+    pub excess_j: T,
     /// How long the tick before took with reading and writing the joints, processor cycles; 0 where there is no counter.
     pub cycles: u32,
     /// Ticks that were late since the start.
@@ -107,9 +118,13 @@ impl<const J: usize> Record<f32, J> {
         reading_failed: None,
         force_n: 0.0,
         attitude_stiffness_nm: 0.0,
+        integral_gain_nm_rad: 0.0,
         approach_potential_j: 0.0,
         attitude_potential_j: 0.0,
-        energy_j: 0.0,
+        integral_potential_j: 0.0,
+        work_j: 0.0,
+        damped_j: 0.0,
+        excess_j: 0.0,
         cycles: 0,
         late_ticks: 0,
         dropped: 0,
@@ -132,10 +147,52 @@ impl<const J: usize> Record<f32, J> {
             + 2 * fault
             + answer
             + events
-            + 5 * float
+            + LAW * float
             + 3 * list
             + J * (number + float + 1)
     };
+
+    /// What the law and the ledger tell, in this order: gains, potentials, work.
+    pub(crate) const fn law(&self) -> [f32; LAW] {
+        [
+            self.force_n,
+            self.attitude_stiffness_nm,
+            self.integral_gain_nm_rad,
+            self.approach_potential_j,
+            self.attitude_potential_j,
+            self.integral_potential_j,
+            self.work_j,
+            self.damped_j,
+            self.excess_j,
+        ]
+    }
+
+    /// The same record, of which the law and the ledger tell this.
+    #[must_use]
+    pub(crate) fn with_law(self, law: [f32; LAW]) -> Self {
+        let [
+            force_n,
+            attitude_stiffness_nm,
+            integral_gain_nm_rad,
+            potentials_j @ ..,
+            work_j,
+            damped_j,
+            excess_j,
+        ] = law;
+        let [approach_potential_j, attitude_potential_j, integral_potential_j] = potentials_j;
+        Self {
+            force_n,
+            attitude_stiffness_nm,
+            integral_gain_nm_rad,
+            approach_potential_j,
+            attitude_potential_j,
+            integral_potential_j,
+            work_j,
+            damped_j,
+            excess_j,
+            ..self
+        }
+    }
 
     /// Writes the record into a buffer and returns the part that was written.
     ///
@@ -187,9 +244,13 @@ mod tests {
             reading_failed: Some(Raised::at(2, Fault::SampleMissing)),
             force_n: 5.0,
             attitude_stiffness_nm: 0.005,
+            integral_gain_nm_rad: 0.375,
             approach_potential_j: 0.25,
             attitude_potential_j: 0.125,
-            energy_j: 0.0625,
+            integral_potential_j: 0.75,
+            work_j: -0.5,
+            damped_j: 0.03125,
+            excess_j: 0.0625,
             cycles: 20_000,
             late_ticks: 2,
             dropped: 1,
@@ -204,7 +265,7 @@ mod tests {
         bytes.iter().map(|byte| format!("{byte:02x}")).collect()
     }
 
-    /// The bytes of interface version 3. If this fails, the interface has changed: raise [`INTERFACE_VERSION`], and
+    /// The bytes of interface version 4. If this fails, the interface has changed: raise [`INTERFACE_VERSION`], and
     /// only then replace the bytes.
     #[test]
     fn golden_bytes() {
@@ -218,9 +279,13 @@ mod tests {
             "01010102",                   // why there are no counts
             "0000a040",                   // force
             "0ad7a33b",                   // attitude stiffness
+            "0000c03e",                   // integral gain
             "0000803e",                   // approach potential
             "0000003e",                   // attitude potential
-            "0000803d",                   // energy
+            "0000403f",                   // integral potential
+            "000000bf",                   // work
+            "0000003d",                   // damped
+            "0000803d",                   // excess
             "a09c01",                     // cycles
             "02",                         // late ticks
             "01",                         // dropped
@@ -230,7 +295,7 @@ mod tests {
             "03000900",                   // limiting
         );
         let mut buffer = [0; Record::<f32, 3>::MOST_BYTES];
-        assert_eq!(INTERFACE_VERSION, 3);
+        assert_eq!(INTERFACE_VERSION, 4);
         assert_eq!(hex(example::<3>().encode(&mut buffer).unwrap()), golden);
         let mut buffer = [0; Record::<f32, 32>::MOST_BYTES];
         assert_eq!(hex(example::<32>().encode(&mut buffer).unwrap()), golden, "depends on the capacity");
@@ -249,7 +314,7 @@ mod tests {
         for command in Command::ALL {
             commands.push(postcard::to_slice(&command, &mut buffer).unwrap().to_vec());
         }
-        assert_eq!(bytes(commands), "0001020000030405");
+        assert_eq!(bytes(commands), "000102000000030405");
         let mut refusals = Vec::new();
         for refusal in Refusal::ALL {
             refusals.push(postcard::to_slice(refusal, &mut buffer).unwrap().to_vec());
@@ -272,7 +337,11 @@ mod tests {
             dropped: u32::MAX,
             decimation: u16::MAX,
             answer: Some(Answer {
-                command: Command::Grasp(Grasp { force_n: Some(0.0), attitude_stiffness_nm: Some(0.0) }),
+                command: Command::Grasp(Grasp {
+                    force_n: Some(0.0),
+                    attitude_stiffness_nm: Some(0.0),
+                    integral_gain_nm_rad: Some(0.0),
+                }),
                 refused: Some(Refusal::Busy),
             }),
             counts: List::first_of([i32::MIN; 12], 12),
@@ -307,9 +376,10 @@ mod tests {
     }
 
     fn answers() -> impl Strategy<Value = Option<Answer>> {
-        let grasp = any::<(Option<f32>, Option<f32>)>().prop_map(|(force_n, attitude_stiffness_nm)| {
-            Command::Grasp(Grasp { force_n, attitude_stiffness_nm })
-        });
+        let grasp =
+            any::<[Option<f32>; 3]>().prop_map(|[force_n, attitude_stiffness_nm, integral_gain_nm_rad]| {
+                Command::Grasp(Grasp { force_n, attitude_stiffness_nm, integral_gain_nm_rad })
+            });
         let command = prop_oneof![proptest::sample::select(&Command::ALL[..]), grasp];
         let refused = proptest::option::of(proptest::sample::select(Refusal::ALL));
         proptest::option::of((command, refused).prop_map(|(command, refused)| Answer { command, refused }))
@@ -323,7 +393,7 @@ mod tests {
             (late, heartbeat) in any::<(bool, bool)>(),
             (cycles, late_ticks, dropped, decimation) in any::<(u32, u32, u32, u16)>(),
             answer in answers(),
-            floats in any::<[f32; 5]>(),
+            law in any::<[f32; LAW]>(),
             count in 0..=12_usize,
             counts in any::<[i32; 12]>(),
             torques in any::<[f32; 12]>(),
@@ -342,11 +412,6 @@ mod tests {
                 answer,
                 events: Events::NONE.with(Event::Late, late).with(Event::Heartbeat, heartbeat),
                 reading_failed: fault.map(|(fault, joint)| Raised { fault, joint }),
-                force_n: floats[0],
-                attitude_stiffness_nm: floats[1],
-                approach_potential_j: floats[2],
-                attitude_potential_j: floats[3],
-                energy_j: floats[4],
                 cycles,
                 late_ticks,
                 dropped,
@@ -354,7 +419,9 @@ mod tests {
                 counts: List::first_of(counts, count),
                 torques_nm: List::first_of(torques, count),
                 limiting: List::first_of(limiting, count),
+                ..Record::BLANK
             }
+            .with_law(law)
         }
     }
 

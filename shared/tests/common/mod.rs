@@ -83,12 +83,14 @@ pub(crate) fn config<T: Real, const J: usize>() -> Config<T, J> {
         law: GraspConfig {
             force_n: real(5.0),
             attitude_stiffness_nm: real(5e-3),
+            integral_gain_nm_rad: T::zero(),
             damping_nm_s,
             gravity_m_s2: Some(vector(0.0, 0.0, -9.81)),
         },
         limits: LimitConfig {
             force_n: Some(real(500.0)),
             attitude_stiffness_nm: Some(real(0.1)),
+            integral_gain_nm_rad: Some(real(1.0)),
             torque_nm: Some([real(TORQUE_NM); J]),
             slew_nm_s: Some([real(SLEW_NM_S); J]),
             stops: Some(StopConfig {

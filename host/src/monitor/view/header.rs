@@ -66,7 +66,11 @@ fn state<'a>(model: &'a Model, screen: &Screen<'a>, now: Duration, width: usize)
     }
     parts.push(Span::raw(format!("force {:.2} N", record.force_n)));
     parts.push(Span::raw(format!("stiffness {:.4} N m", record.attitude_stiffness_nm)));
-    parts.push(Span::raw(format!("work {} J", fixed(record.energy_j, 3))));
+    if record.integral_gain_nm_rad > 0.0 {
+        parts.push(Span::raw(format!("integral {:.4} N m/rad", record.integral_gain_nm_rad)));
+    }
+    parts.push(Span::raw(format!("work {} J", fixed(record.work_j, 3))));
+    parts.push(Span::raw(format!("excess {} J", fixed(record.excess_j, 3))));
     if let Some(time_s) = model.device_time_s() {
         parts.push(Span::styled(format!("device {time_s:.1} s"), palette.faint()));
     }

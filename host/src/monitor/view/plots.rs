@@ -13,6 +13,10 @@ use std::time::Duration;
 /// Dots of a braille character side by side.
 const DOTS: usize = 2;
 
+/// What a few curves are drawn with, and what that looks like.
+const MARKERS: [(Marker, &str); 3] =
+    [(Marker::Braille, "fine"), (Marker::Dot, "dots"), (Marker::Block, "blocks")];
+
 /// Draws the plot that is chosen.
 pub(super) fn draw(frame: &mut Frame<'_>, area: Rect, model: &Model, screen: &Screen<'_>, now: Duration) {
     let palette = screen.palette;
@@ -33,11 +37,9 @@ pub(super) fn draw(frame: &mut Frame<'_>, area: Rect, model: &Model, screen: &Sc
         })
         .collect();
     let datasets = curves.iter().map(|(number, points)| {
-        // Where two are drawn together, their dots differ as well.
-        let marker = match (screen.plot, number) {
-            (Plot::Potentials, 1) => Marker::Dot,
-            _ => Marker::Braille,
-        };
+        // Where a few are drawn together, their marks differ as well.
+        let marker = MARKERS.get(*number).filter(|_| !screen.plot.signals().is_empty());
+        let marker = marker.map_or(Marker::Braille, |&(marker, _)| marker);
         let graph = Dataset::default().graph_type(GraphType::Line).marker(marker);
         graph.style(palette.curve(*number)).data(points)
     });
@@ -69,8 +71,11 @@ fn title(model: &Model, screen: &Screen<'_>, joint: Option<usize>) -> String {
         (plot, _) => plot.words(),
     };
     let whose = match joint {
-        _ if screen.plot == Plot::Potentials => ": approach (fine), attitudes (dots)".into(),
-        _ if !screen.plot.is_of_joints() => String::new(),
+        _ if !screen.plot.is_of_joints() => {
+            let named = screen.plot.signals().iter().zip(MARKERS);
+            let named = named.map(|(name, (_, looks))| format!("{name} ({looks})")).collect::<Vec<_>>();
+            if named.is_empty() { String::new() } else { format!(": {}", named.join(", ")) }
+        }
         None => ": all joints".into(),
         Some(joint) => format!(": {}", name(joint)),
     };

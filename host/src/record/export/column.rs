@@ -63,9 +63,13 @@ columns! {
     FallbackClock,      "fallback_clock",        Truth,  "",       "whether the clock is not the crystal";
     Force,              "force_n",               Real,   "N",      "force f_d that acts";
     Stiffness,          "attitude_stiffness_nm", Real,   "N m",    "attitude stiffness K_st that acts";
+    IntegralGain,       "integral_gain_nm_rad",  Real,   "N m/rad", "gain K_I of the earlier law that acts";
     Approach,           "approach_potential_j",  Real,   "J",      "potential V_s of the approach";
     Attitude,           "attitude_potential_j",  Real,   "J",      "potential V_st of the attitudes, above its least value";
-    Energy,             "energy_j",              Real,   "J",      "work of the joints in the last second (fading)";
+    Integral,           "integral_potential_j",  Real,   "J",      "potential V_I of the joints' turns since the grasp began";
+    Work,               "work_j",                Real,   "J",      "work of the motors since the last grasp began";
+    Damped,             "damped_j",              Real,   "J",      "what the law's damping has taken since the last grasp began";
+    Excess,             "excess_j",              Real,   "J",      "work of the motors in the last second (fading) beyond the drop of the law's potentials";
     Cycles,             "cycles",                Whole,  "cycles", "processor cycles of the tick before; 0 where nothing counts them";
     LateTicks,          "late_ticks",            Whole,  "",       "ticks that were late since the start";
     Dropped,            "dropped",               Whole,  "",       "records and answers that the device lost since its start";
@@ -209,9 +213,13 @@ impl Column {
                 OfHand::FallbackClock => Cell::Truth(record.events.contains(Event::FallbackClock)),
                 OfHand::Force => Cell::Real(record.force_n),
                 OfHand::Stiffness => Cell::Real(record.attitude_stiffness_nm),
+                OfHand::IntegralGain => Cell::Real(record.integral_gain_nm_rad),
                 OfHand::Approach => Cell::Real(record.approach_potential_j),
                 OfHand::Attitude => Cell::Real(record.attitude_potential_j),
-                OfHand::Energy => Cell::Real(record.energy_j),
+                OfHand::Integral => Cell::Real(record.integral_potential_j),
+                OfHand::Work => Cell::Real(record.work_j),
+                OfHand::Damped => Cell::Real(record.damped_j),
+                OfHand::Excess => Cell::Real(record.excess_j),
                 OfHand::Cycles => Cell::Whole(record.cycles.into()),
                 OfHand::LateTicks => Cell::Whole(record.late_ticks.into()),
                 OfHand::Dropped => Cell::Whole(record.dropped.into()),
@@ -284,7 +292,7 @@ mod tests {
         assert_eq!(names(&["*"]).unwrap(), names(&[]).unwrap());
         assert_eq!(
             names(&["*potential*"]).unwrap(),
-            ["time_s", "approach_potential_j", "attitude_potential_j"]
+            ["time_s", "approach_potential_j", "attitude_potential_j", "integral_potential_j"]
         );
     }
 

@@ -107,7 +107,6 @@ pub(super) fn write_tick(decoded: &Decoded, joint_names: &[String], buffer: &mut
     float(buffer, tick::STIFFNESS_NM, record.attitude_stiffness_nm);
     float(buffer, tick::APPROACH_J, record.approach_potential_j);
     float(buffer, tick::ATTITUDE_J, record.attitude_potential_j);
-    float(buffer, tick::ENERGY_J, record.energy_j);
     whole(buffer, tick::CYCLES, record.cycles.into());
     whole(buffer, tick::LATE_TICKS, record.late_ticks.into());
     whole(buffer, tick::DROPPED, record.dropped.into());
@@ -118,6 +117,11 @@ pub(super) fn write_tick(decoded: &Decoded, joint_names: &[String], buffer: &mut
             nested(buffer, k as u32 + 1, |buffer| write_joint(decoded, k, buffer));
         }
     });
+    float(buffer, tick::INTEGRAL_NM_RAD, record.integral_gain_nm_rad);
+    float(buffer, tick::INTEGRAL_J, record.integral_potential_j);
+    float(buffer, tick::WORK_J, record.work_j);
+    float(buffer, tick::DAMPED_J, record.damped_j);
+    float(buffer, tick::EXCESS_J, record.excess_j);
 }
 
 fn write_joint(decoded: &Decoded, k: usize, buffer: &mut Vec<u8>) {

@@ -51,7 +51,7 @@ const HALF: &str = "11 significant bits (IEEE 754 binary16) in dense records, ex
 
 #[rustfmt::skip]
 signals! {
-    /// Of a tick.
+    /// Of a tick. Number 16 was that of a signal which is no more.
     tick:
     SEQUENCE            =  1, "sequence",             Uint32, "",       "Number of the record, one more from record to record, modulo 2^32", EXACT;
     TICK                =  2, "tick",                 Uint32, "",       "Number of the tick since the device's start, modulo 2^32", EXACT;
@@ -68,13 +68,17 @@ signals! {
     STIFFNESS_NM        = 13, "attitude_stiffness_nm", Float, "N m",    "Attitude stiffness K_st that acts", HALF;
     APPROACH_J          = 14, "approach_potential_j", Float,  "J",      "Potential V_s of the approach", HALF;
     ATTITUDE_J          = 15, "attitude_potential_j", Float,  "J",      "Potential V_st of the attitudes, above its least value", HALF;
-    ENERGY_J            = 16, "energy_j",             Float,  "J",      "Work of the joints in the last second (fading)", HALF;
     CYCLES              = 17, "cycles",               Uint32, "cycles", "Processor cycles of reading and writing the joints in the tick before; 0 where nothing counts them", CYCLES;
     LATE_TICKS          = 18, "late_ticks",           Uint32, "",       "Ticks that were late since the start", EXACT;
     DROPPED             = 19, "dropped",              Uint32, "",       "Records and answers that the device lost since its start because a queue was full", EXACT;
     DECIMATION          = 20, "decimation",           Uint32, "ticks",  "Ticks from one sent record to the next", EXACT;
     LOST_BEFORE         = 21, "lost_before",          Uint64, "",       "Records missing between the one before and this one", EXACT;
     JOINTS              = 22, "joints",               Message, "",      "The joints by name", NOTHING;
+    INTEGRAL_NM_RAD     = 23, "integral_gain_nm_rad", Float,  "N m/rad", "Gain K_I of the earlier law that acts", HALF;
+    INTEGRAL_J          = 24, "integral_potential_j", Float,  "J",      "Potential V_I of the joints' turns since the grasp began", HALF;
+    WORK_J              = 25, "work_j",               Float,  "J",      "Work of the motors since the last grasp began", HALF;
+    DAMPED_J            = 26, "damped_j",             Float,  "J",      "What the law's damping has taken since the last grasp began", HALF;
+    EXCESS_J            = 27, "excess_j",             Float,  "J",      "Work of the motors in the last second (fading) beyond the drop of the law's potentials", HALF;
 }
 
 #[rustfmt::skip]

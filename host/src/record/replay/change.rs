@@ -86,7 +86,7 @@ fn parameter(key: &str) -> Option<(Parameter, &str)> {
 impl Change {
     /// Whether it acts only on grasps that begin after it.
     pub(super) fn is_of_the_grasp(&self) -> bool {
-        matches!(self.parameter, Parameter::Force | Parameter::AttitudeStiffness)
+        matches!(self.parameter, Parameter::Force | Parameter::AttitudeStiffness | Parameter::IntegralGain)
     }
 
     /// Puts it into a configuration, without looking at the others.

@@ -82,13 +82,14 @@ mod tests {
     use blindgrasp_shared::fault::FaultConfig;
     use blindgrasp_shared::identity::{Clock, Identity, Image, ResetCause, UNITS};
     use blindgrasp_shared::limit::LimitConfig;
+    use blindgrasp_shared::telemetry::INTERFACE_VERSION;
 
     #[test]
     fn any_configuration_comes_back_from_its_parameters() {
         let model = HandModel::load("three-finger").unwrap();
         let file = HandFile::load("three-finger").unwrap();
         let image = Image {
-            interface_version: 3,
+            interface_version: INTERFACE_VERSION,
             kind: "hand",
             hand: &model.name,
             hand_hash: model.hash(),

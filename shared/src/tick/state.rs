@@ -1,0 +1,147 @@
+//! What the tick remembers, and its bytes.
+
+use super::Params;
+use crate::buffer::BufferTooSmall;
+use crate::control::{Gains, Latch};
+use crate::estimate::{Motion, Tracks};
+use crate::fault::{Raised, Watched};
+use crate::hand::Posture;
+use crate::ledger::Ledger;
+use crate::math::Real;
+use crate::supervisor::{Mode, Supervisor};
+use crate::telemetry::snapshot::{Loader, Saver, SnapshotError};
+
+/// Everything that the tick remembers.
+#[derive(Clone, Debug, PartialEq)]
+pub struct State<T, const J: usize, const F: usize> {
+    pub(super) ticks: u32,
+    pub(super) tracks: Tracks<T, J>,
+    pub(super) motion: Motion<T, J>,
+    pub(super) supervisor: Supervisor,
+    pub(super) watched: Watched<T, J>,
+    /// How firm this grasp is, when it is at its full force.
+    pub(super) grasp: Gains<T>,
+    /// How the hand stood when the grasp began, while there is one.
+    pub(super) latch: Option<Latch<T, J, F>>,
+    /// Where everything was in the last tick with torque.
+    pub(super) posture: Posture<T, J, F>,
+    /// Torques of the last tick, N m.
+    pub(super) torques_nm: [T; J],
+    pub(super) ledger: Ledger<T, J>,
+}
+
+impl<T: Real, const J: usize, const F: usize> State<T, J, F> {
+    /// Disarmed, before the first tick.
+    pub fn new() -> Self {
+        Self {
+            ticks: 0,
+            tracks: Tracks::new(),
+            motion: Motion::still(),
+            supervisor: Supervisor::new(),
+            watched: Watched::new(),
+            grasp: Gains::none(),
+            latch: None,
+            posture: Posture::at_base(),
+            torques_nm: [T::zero(); J],
+            ledger: Ledger::new(),
+        }
+    }
+
+    /// Joint angles as the last tick saw them, rad.
+    pub fn angles_rad(&self) -> &[T; J] {
+        &self.motion.angles_rad
+    }
+
+    /// Joint speeds as the last tick saw them, rad/s.
+    pub fn speeds_rad_s(&self) -> &[T; J] {
+        &self.motion.speeds_rad_s
+    }
+
+    /// The mode.
+    pub fn mode(&self) -> Mode {
+        self.supervisor.mode()
+    }
+
+    /// The fault that the hand is in, or that lets the object go.
+    pub fn fault(&self) -> Option<Raised> {
+        self.supervisor.fault()
+    }
+
+    /// How the hand stood when the grasp began, while there is one.
+    pub fn latch(&self) -> Option<&Latch<T, J, F>> {
+        self.latch.as_ref()
+    }
+}
+
+impl<const J: usize, const F: usize> State<f32, J, F> {
+    /// Writes all that the ticks to come depend on, and returns the part of the buffer that it takes up.
+    ///
+    /// # Errors
+    /// If the buffer is too small; [`BYTES_PER_JOINT`](crate::telemetry::snapshot::BYTES_PER_JOINT) for each joint
+    /// always suffice.
+    pub fn save<'b>(
+        &self,
+        params: &Params<f32, J, F>,
+        buffer: &'b mut [u8],
+    ) -> Result<&'b mut [u8], BufferTooSmall> {
+        let (joints, fingertips) = (params.hand.joint_count(), params.hand.fingertip_count());
+        let mut to = Saver::new(buffer);
+        to.u8(joints as u8)?;
+        to.u8(fingertips as u8)?;
+        to.u32(self.ticks)?;
+        self.supervisor.save(&mut to)?;
+        to.f32(self.grasp.force_n)?;
+        to.f32(self.grasp.attitude_stiffness_nm)?;
+        to.f32(self.grasp.integral_gain_nm_rad)?;
+        self.watched.save(joints, &mut to)?;
+        self.tracks.save(joints, &mut to)?;
+        self.motion.save(joints, &mut to)?;
+        self.torques_nm.iter().take(joints).try_for_each(|&torque| to.f32(torque))?;
+        to.u8(u8::from(self.latch.is_some()))?;
+        if let Some(latch) = &self.latch {
+            latch.save(joints, fingertips, &mut to)?;
+        }
+        self.ledger.save(joints, &mut to)?;
+        to.finish()
+    }
+
+    /// Reads what [`Self::save`] wrote. The ticks that follow are those that followed there, to the bit.
+    ///
+    /// # Errors
+    /// What is wrong with the bytes.
+    pub fn load(params: &Params<f32, J, F>, bytes: &[u8]) -> Result<Self, SnapshotError> {
+        let mut from = Loader::new(bytes);
+        let (joints, fingertips) = (from.u8()?, from.u8()?);
+        let here = (params.hand.joint_count(), params.hand.fingertip_count());
+        if (usize::from(joints), usize::from(fingertips)) != here {
+            return Err(SnapshotError::OtherHand { joints, fingertips });
+        }
+        let (joints, fingertips) = here;
+        let mut state = Self::new();
+        state.ticks = from.u32()?;
+        state.supervisor = Supervisor::load(&mut from)?;
+        state.grasp = Gains {
+            force_n: from.f32()?,
+            attitude_stiffness_nm: from.f32()?,
+            integral_gain_nm_rad: from.f32()?,
+        };
+        state.watched = Watched::load(joints, &mut from)?;
+        state.tracks = Tracks::load(joints, &mut from)?;
+        state.motion = Motion::load(joints, &mut from)?;
+        for torque in state.torques_nm.iter_mut().take(joints) {
+            *torque = from.f32()?;
+        }
+        if from.flag()? {
+            state.latch = Some(Latch::load(joints, fingertips, &mut from)?);
+        }
+        state.ledger = Ledger::load(joints, &mut from)?;
+        from.finish()?;
+        Ok(state)
+    }
+}
+
+impl<T: Real, const J: usize, const F: usize> Default for State<T, J, F> {
+    fn default() -> Self {
+        Self::new()
+    }
+}
