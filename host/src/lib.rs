@@ -16,6 +16,8 @@ pub mod device;
 pub mod inspect;
 #[cfg(feature = "command")]
 pub mod monitor;
+#[cfg(feature = "command")]
+pub mod paper;
 pub mod placement;
 pub mod plant;
 pub mod record;

@@ -7,6 +7,7 @@ pub(crate) mod hand;
 pub(crate) mod monitor;
 pub(crate) mod object;
 mod output;
+pub(crate) mod paper;
 pub(crate) mod pil;
 mod ports;
 pub(crate) mod record;

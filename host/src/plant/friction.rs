@@ -29,6 +29,11 @@ pub struct FrictionTorque {
     pub stiffness_nm: f64,
 }
 
+impl FrictionTorque {
+    /// No friction.
+    pub const NONE: Self = Self { torque_nm: 0.0, damping_nm_s: 0.0, stiffness_nm: 0.0 };
+}
+
 impl JointFriction {
     /// Friction of a joint whose spring is stretched by `stretch_rad` and which moves at about `speed_rad_s`.
     pub fn torque(&self, stretch_rad: f64, speed_rad_s: f64) -> FrictionTorque {

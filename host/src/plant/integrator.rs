@@ -22,11 +22,14 @@
 use super::contact::{Contact, Rows};
 use super::coupling::{Branches, Coupling, Everything, MAX_CHAIN, ObjectMass};
 use super::dynamics::{Body, JointMatrix, JointVector, bias_torques, mass_matrix, place_bodies};
+use super::friction::FrictionTorque;
+use super::ledger::Flows;
 use super::model::{ContactForce, Lost, ModelError, Motion, PlantModel};
+use super::rotation::{solve_inertia, turn_freely, world_inertia};
 use super::surroundings::Surroundings;
 use crate::{MAX_FINGERS, MAX_JOINTS, Posture};
 use blindgrasp_shared::math::Real;
-use nalgebra::{Matrix3, Quaternion, UnitQuaternion, Vector3};
+use nalgebra::Vector3;
 
 /// The least relative pivot at which constraints still count as independent.
 const LEAST_PIVOT: f64 = 1e-12;
@@ -55,6 +58,11 @@ pub struct Plant {
     forces: Vec<ContactForce>,
     coupling: Coupling,
     solution: Everything,
+    /// Friction of the joints at this instant, at standstill.
+    friction: [FrictionTorque; MAX_JOINTS],
+    /// Powers at this instant, and work up to the half step before it.
+    power: Flows,
+    work: Flows,
 }
 
 impl Plant {
@@ -91,6 +99,9 @@ impl Plant {
             stretch_rad: [0.0; MAX_JOINTS],
             started: false,
             solution: velocities,
+            friction: [FrictionTorque::NONE; MAX_JOINTS],
+            power: Flows::NONE,
+            work: Flows::NONE,
             model,
         };
         plant.place();
@@ -147,6 +158,23 @@ impl Plant {
         self.contacts.iter().map(Contact::elastic_energy_j).sum()
     }
 
+    /// Potential energy of the weight of hand and object, J; zero where all of it is in the base frame's origin.
+    pub fn weight_energy_j(&self) -> f64 {
+        let PlantModel { hand, object, hand_gravity_m_s2, object_gravity_m_s2, .. } = &self.model;
+        let mut energy_j = -object.mass_kg * object_gravity_m_s2.dot(&self.motion.position_m);
+        for k in 0..hand.joint_count() {
+            let link = hand.link(k);
+            let centre_m = self.posture.link(k).point(&link.mass_centre_m);
+            energy_j -= link.mass_kg * hand_gravity_m_s2.dot(&centre_m);
+        }
+        energy_j
+    }
+
+    /// What has flowed in and out of the plant's energy from the start to this instant, after [`Self::solve`]: work, J.
+    pub fn flows(&self) -> Flows {
+        if self.started { self.work.after(&self.power, 0.5 * self.substep_s) } else { Flows::NONE }
+    }
+
     /// Largest violation of the rolling constraints at this instant, `|P v|`, m/s.
     pub fn slip_m_s(&self) -> f64 {
         let m = &self.motion;
@@ -187,9 +215,9 @@ impl Plant {
         }
         let weight = self.model.object_gravity_m_s2 * object.mass_kg;
         push.object[..3].copy_from_slice(weight.as_slice());
-        let mut scales = [0.0; MAX_FINGERS];
+        let mut pressed = [Pressed { scale: 0.0, rate_m_s: 0.0 }; MAX_FINGERS];
         for i in 0..self.contacts.len() {
-            scales[i] = self.press(i, tau, &mut push);
+            pressed[i] = self.press(i, tau, &mut push);
         }
         let mut velocities = self.before;
         let pivot = self.coupling.solve(&mut velocities, &push, tau);
@@ -201,7 +229,7 @@ impl Plant {
         }
         for (i, (force, contact)) in self.forces.iter_mut().zip(&self.contacts).enumerate() {
             let multiplier = |row| self.coupling.multiplier(i, row);
-            force.normal_n -= scales[i] * multiplier(Rows::INDENTATION);
+            force.normal_n -= pressed[i].scale * multiplier(Rows::INDENTATION);
             force.lambda_x_n = -multiplier(Rows::SLIP_X);
             force.lambda_z_n = -multiplier(Rows::SLIP_Z);
             force.torsion_nm = contact.torsion_nm_s.square_root() * multiplier(Rows::TORSION);
@@ -210,6 +238,7 @@ impl Plant {
         if self.started {
             set_velocities(&mut self.motion, &velocities);
         }
+        self.power = self.powers(torques_nm, tau, &pressed);
         Ok(())
     }
 
@@ -238,6 +267,8 @@ impl Plant {
         motion.position_m += h * Vector3::new(after.object[0], after.object[1], after.object[2]);
         motion.attitude = turn_freely(&motion.attitude, inertia, &self.spin_momentum, h);
         set_velocities(motion, &ahead);
+        // Half a step on either side of the instant; the start has one side only.
+        self.work = self.work.after(&self.power, if self.started { h } else { 0.5 * h });
         self.started = true;
         self.place();
     }
@@ -284,7 +315,7 @@ impl Plant {
     /// Adds what acts on the joints, without contacts; `softness` is what friction adds to the diagonal of the mass
     /// matrix because it is solved for implicitly.
     fn joint_forces(
-        &self,
+        &mut self,
         torques_nm: &JointVector,
         tau: f64,
         push: &mut Everything,
@@ -295,6 +326,7 @@ impl Plant {
         let bias = bias_torques(&self.model.hand, &self.posture, &self.bodies, speeds, gravity);
         for (k, friction) in self.model.friction.iter().enumerate() {
             let friction = friction.torque(self.stretch_rad[k], speeds[k]);
+            self.friction[k] = friction;
             push.joints[k] =
                 torques_nm[k] - bias[k] - friction.torque_nm - friction.damping_nm_s * self.before.joints[k];
             softness[k] = tau * (friction.damping_nm_s + tau * friction.stiffness_nm);
@@ -302,8 +334,8 @@ impl Plant {
     }
 
     /// Adds the normal force of contact `i` as the velocities before would have it, and sets the contact's rows, which
-    /// correct it. Returns the scale of the indentation row.
-    fn press(&mut self, i: usize, tau: f64, push: &mut Everything) -> f64 {
+    /// correct it.
+    fn press(&mut self, i: usize, tau: f64, push: &mut Everything) -> Pressed {
         let (contact, centre) = (&self.contacts[i], &self.posture.centres_m[i]);
         let object = contact.object_rows();
         let mut joints = [[0.0; Rows::COUNT]; MAX_JOINTS];
@@ -329,8 +361,42 @@ impl Plant {
             self.coupling.set_row(i, row, scale, |k| joints[k][row], &object[row]);
         }
         self.forces[i].normal_n = normal;
-        scale
+        Pressed { scale, rate_m_s: rate }
     }
+
+    /// What flows at this instant, with the velocities that were solved for.
+    fn powers(&self, torques_nm: &JointVector, tau: f64, pressed: &[Pressed; MAX_FINGERS]) -> Flows {
+        let mut flows = Flows::NONE;
+        let speeds = self.solution.joints.iter().zip(&self.before.joints);
+        for (k, (speed, before)) in speeds.enumerate().take(self.model.hand.joint_count()) {
+            // As in `joint_forces`, with the part that is implicit.
+            let FrictionTorque { torque_nm, damping_nm_s, stiffness_nm } = self.friction[k];
+            let friction_nm = torque_nm + damping_nm_s * speed + tau * stiffness_nm * (speed - before);
+            flows.motors += torques_nm[k] * speed;
+            flows.friction += friction_nm * speed;
+            flows.joint_speeds_squared[k] = speed * speed;
+        }
+        for (i, contact) in self.contacts.iter().enumerate() {
+            let Pressed { scale, rate_m_s } = pressed[i];
+            let rate_m_s = rate_m_s - self.coupling.multiplier(i, Rows::INDENTATION) / scale;
+            flows.indentation += contact.damping_n_s_m * rate_m_s * rate_m_s;
+            let torsion = self.coupling.multiplier(i, Rows::TORSION);
+            flows.torsion += torsion * torsion;
+        }
+        let object = &self.solution.object;
+        flows.velocity_squared = object[..3].iter().map(|v| v * v).sum();
+        flows.spin_squared = tail(object).norm_squared();
+        flows
+    }
+}
+
+/// A contact's normal force before it is solved for.
+#[derive(Clone, Copy, Debug)]
+struct Pressed {
+    /// Scale of the indentation row.
+    scale: f64,
+    /// Rate of indentation with the velocities before, m/s.
+    rate_m_s: f64,
 }
 
 /// Velocities of a motion.
@@ -366,39 +432,4 @@ fn set_tail(v: &mut [f64; 6], w: &Vector3<f64>) {
 
 fn dot6(a: &[f64; 6], b: &[f64; 6]) -> f64 {
     a.iter().zip(b).map(|(a, b)| a * b).sum()
-}
-
-/// Inertia tensor in base axes.
-fn world_inertia(inertia: &Matrix3<f64>, attitude: &UnitQuaternion<f64>) -> Matrix3<f64> {
-    let r = attitude.to_rotation_matrix().into_inner();
-    r * inertia * r.transpose()
-}
-
-/// `I^-1 L` for a symmetric tensor, by cofactors.
-fn solve_inertia(inertia: &Matrix3<f64>, momentum: &Vector3<f64>) -> Vector3<f64> {
-    let (a, b, c) = (inertia.column(0), inertia.column(1), inertia.column(2));
-    let cofactors = Matrix3::from_columns(&[b.cross(&c), c.cross(&a), a.cross(&b)]);
-    cofactors.tr_mul(momentum) / a.dot(&cofactors.column(0))
-}
-
-/// Attitude after a time `h_s` of free rotation with a given angular momentum: midpoint rule.
-fn turn_freely(
-    attitude: &UnitQuaternion<f64>,
-    inertia: &Matrix3<f64>,
-    momentum: &Vector3<f64>,
-    h_s: f64,
-) -> UnitQuaternion<f64> {
-    let spin = |attitude: &UnitQuaternion<f64>| solve_inertia(&world_inertia(inertia, attitude), momentum);
-    let half_way = turned(attitude, &(spin(attitude) * (0.5 * h_s)));
-    turned(attitude, &(spin(&half_way) * h_s))
-}
-
-/// `exp(angle) attitude`, for a rotation vector in base axes.
-fn turned(attitude: &UnitQuaternion<f64>, angle_rad: &Vector3<f64>) -> UnitQuaternion<f64> {
-    let half = 0.5 * angle_rad.norm();
-    let (sine, cosine) = half.sine_cosine();
-    // sin(half) / |angle|, whose limit at no angle is one half.
-    let share = if half > 1e-12 { 0.5 * sine / half } else { 0.5 };
-    let turn = Quaternion::from_parts(cosine, angle_rad * share);
-    UnitQuaternion::new_normalize(turn * attitude.into_inner())
 }

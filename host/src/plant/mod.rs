@@ -1,18 +1,22 @@
 //! The simulated plant: hand, free rigid object, and soft fingertips that roll on its faces (Eqs. 1-28).
 //!
 //! [`model`] says what is simulated, [`integrator`] advances it in time. The parts: [`dynamics`] of the hand, [`contact`] of a
-//! fingertip with a face, joint [`friction`], and `coupling`, the linear algebra that solves for all of them together.
+//! fingertip with a face, joint [`friction`], `rotation` of the object, and `coupling`, the linear algebra that solves for all of
+//! them together. A [`ledger`] is kept of the energy that flows in and out.
 
 pub mod contact;
 mod coupling;
 pub mod dynamics;
 pub mod friction;
 pub mod integrator;
+pub mod ledger;
 mod linear;
 pub mod model;
 pub mod polyhedron;
+mod rotation;
 mod surroundings;
 
 pub use coupling::MAX_CHAIN;
 pub use integrator::Plant;
+pub use ledger::Flows;
 pub use model::{ContactForce, Lost, ModelError, Motion, ObjectModel, PlantModel};

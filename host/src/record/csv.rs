@@ -38,7 +38,10 @@ fn header(joints: usize, fingers: usize) -> Vec<String> {
         let contact = ["f_N", "lambda_x", "lambda_z", "dr", "foot_x", "foot_z"];
         names.extend(contact.map(|quantity| format!("{quantity}_{finger}")));
     }
-    names.extend(["energy_j", "mode"].map(str::to_owned));
+    let energies = ["energy", "kinetic", "elastic", "weight", "approach", "attitude", "integral"];
+    let flows = ["motors", "damping", "indentation", "torsion", "friction"];
+    names.extend(energies.iter().chain(&flows).map(|name| format!("{name}_j")));
+    names.push("mode".to_owned());
     names
 }
 
@@ -56,5 +59,8 @@ fn fill(row: &mut Vec<f64>, sample: &Sample) {
     for ContactSample { normal_force_n, lambda_n: [x, z], indentation_m, foot_m, .. } in &sample.contacts {
         row.extend([*normal_force_n, *x, *z, *indentation_m, foot_m[0], foot_m[1]]);
     }
-    row.push(sample.energy_j);
+    let of = &sample.energies;
+    row.extend([sample.energy_j, of.kinetic_j, of.elastic_j, of.weight_j]);
+    row.extend([of.approach_j, of.attitude_j, of.integral_j]);
+    row.extend([of.motors_j, of.damping_j, of.indentation_j, of.torsion_j, of.friction_j]);
 }

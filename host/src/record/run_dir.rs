@@ -46,6 +46,11 @@ impl RunDir {
         &self.path
     }
 
+    /// A directory in it.
+    pub fn below(&self, name: &str) -> Self {
+        Self { path: self.path.join(name) }
+    }
+
     /// Makes the directory if it is not there.
     ///
     /// # Errors

@@ -80,6 +80,17 @@ impl Canvas {
         }
     }
 
+    /// Lays another canvas over this one, its upper left corner at `at` (column, row), as far as it fits.
+    pub(super) fn paste(&mut self, other: &Self, at: (usize, usize)) {
+        let columns = other.width.min(self.width.saturating_sub(at.0));
+        let rows = self.pixels.chunks_exact_mut(self.width.max(1)).skip(at.1);
+        for (row, source) in rows.zip(other.pixels.chunks_exact(other.width.max(1))) {
+            if let (Some(row), Some(source)) = (row.get_mut(at.0..at.0 + columns), source.get(..columns)) {
+                row.copy_from_slice(source);
+            }
+        }
+    }
+
     /// The canvas at `1 / factor` of its size, each pixel the mean of `factor * factor`.
     pub(super) fn reduced(&self, factor: usize) -> Self {
         if factor <= 1 {

@@ -1,5 +1,6 @@
 //! Draws a figure of panels over time.
 
+use super::Files;
 use super::axes::{Chart, Frame, Ruler};
 use super::drawing::{self, Drawing, TITLE_HEIGHT, WIDTH};
 use super::figure::{Axis, Figure, Line, Panel};
@@ -11,6 +12,25 @@ use plotters::prelude::{Circle, DrawingArea, DrawingBackend, LineSeries, PathEle
 
 const TIME_LABELS_HEIGHT: i32 = 42;
 const VALUE_LABELS_WIDTH: i32 = 74;
+/// Of a panel alone.
+const PANEL_WIDTH: i32 = 460;
+const PANEL_HEIGHT: i32 = 190;
+
+/// A panel without title and legend: for a page that has its own, and that is read on a telephone too.
+struct Alone<'a>(&'a Figure, &'a Panel);
+
+impl Drawing for Alone<'_> {
+    fn size(&self) -> (i32, i32) {
+        (PANEL_WIDTH, PANEL_HEIGHT + TIME_LABELS_HEIGHT)
+    }
+
+    fn draw<B: DrawingBackend>(&self, root: &DrawingArea<B, Shift>, scale: i32) -> Result<(), String> {
+        let Self(figure, panel) = self;
+        drawing::paper(root)?;
+        figure.draw_panel(panel, root, true, PANEL_WIDTH, scale)?;
+        root.present().map_err(reason)
+    }
+}
 
 impl Drawing for Figure {
     fn size(&self) -> (i32, i32) {
@@ -27,7 +47,7 @@ impl Drawing for Figure {
             let (_, below) = root.split_vertically(top * scale);
             let (area, _) = below.split_vertically(height * scale);
             let (chart, legend) = area.split_horizontally((WIDTH - legend::WIDTH) * scale);
-            self.draw_panel(panel, &chart, last, scale)?;
+            self.draw_panel(panel, &chart, last, WIDTH - legend::WIDTH, scale)?;
             legend::draw(panel, &legend, scale)?;
             top += height;
         }
@@ -36,6 +56,19 @@ impl Drawing for Figure {
 }
 
 impl Figure {
+    /// Draws it.
+    pub fn files(&self) -> Files {
+        [self.png(), self.svg()]
+    }
+
+    /// One panel alone as an SVG file, without title and legend. `None` if there is no such panel.
+    ///
+    /// # Errors
+    /// What the drawing library says.
+    pub fn panel_svg(&self, k: usize) -> Option<Result<Vec<u8>, String>> {
+        self.panels.get(k).map(|panel| Alone(self, panel).svg())
+    }
+
     fn panel_height(&self, k: usize) -> i32 {
         let usual = match self.panels.len() {
             0..=2 => 260,
@@ -51,6 +84,7 @@ impl Figure {
         panel: &Panel,
         area: &DrawingArea<B, Shift>,
         last: bool,
+        width: i32,
         scale: i32,
     ) -> Result<(), String> {
         let labelled = |ticks: Vec<f64>, label: &dyn Fn(f64, &[f64]) -> String| {
@@ -101,7 +135,7 @@ impl Figure {
             return area.draw(&Text::new("no values above zero", at, style)).map_err(reason);
         }
         // Columns of the bitmap as it is shown: finer ones can't be told apart.
-        let columns = (WIDTH - legend::WIDTH - VALUE_LABELS_WIDTH) as usize;
+        let columns = (width - VALUE_LABELS_WIDTH) as usize;
         for line in &panel.lines {
             let values: Vec<f64> = match decades {
                 // Zero has no logarithm; it sits on the lower edge with all that is too small.

@@ -55,6 +55,12 @@ pub(super) trait Drawing {
     }
 }
 
+/// White paper.
+pub(super) fn paper<B: DrawingBackend>(root: &DrawingArea<B, Shift>) -> Result<(), String> {
+    text::register_with_plotters();
+    root.fill(&WHITE).map_err(reason)
+}
+
 /// White paper, and the title, so many pixels from the left.
 pub(super) fn begin<B: DrawingBackend>(
     root: &DrawingArea<B, Shift>,
@@ -62,8 +68,7 @@ pub(super) fn begin<B: DrawingBackend>(
     left: i32,
     scale: i32,
 ) -> Result<(), String> {
-    text::register_with_plotters();
-    root.fill(&WHITE).map_err(reason)?;
+    paper(root)?;
     let style = letters(TITLE_SIZE, scale, INK).pos(Pos::new(HPos::Left, VPos::Center));
     let corner = (left * scale, TITLE_HEIGHT / 2 * scale);
     root.draw(&Text::new(text::shortened(title, 72), corner, style)).map_err(reason)

@@ -6,17 +6,20 @@ use std::ops::Range;
 
 /// One signal.
 #[derive(Clone, Debug)]
-pub(super) struct Line {
-    pub(super) name: String,
-    pub(super) colour: Rgb,
-    pub(super) dash: Dash,
+pub struct Line {
+    /// In the legend.
+    pub name: String,
+    /// Its colour.
+    pub colour: Rgb,
+    /// Solid or broken.
+    pub dash: Dash,
     /// One value for each time of the figure, in the panel's unit; what is not finite is left out.
-    pub(super) values: Vec<f64>,
+    pub values: Vec<f64>,
 }
 
 /// How values are laid out along the vertical axis.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) enum Axis {
+pub enum Axis {
     /// Over this range, in the panel's unit.
     Linear(Range<f64>),
     /// Over these powers of ten; smaller values sit on the lower edge. `None` where no value is above zero.
@@ -25,22 +28,26 @@ pub(super) enum Axis {
 
 /// One coordinate system.
 #[derive(Clone, Debug)]
-pub(super) struct Panel {
+pub struct Panel {
     /// Over the legend.
-    pub(super) heading: String,
+    pub heading: String,
     /// What is drawn: the axis label without the unit.
-    pub(super) quantity: &'static str,
+    pub quantity: &'static str,
     /// SI unit without prefix.
-    pub(super) unit: &'static str,
-    pub(super) axis: Axis,
-    pub(super) lines: Vec<Line>,
+    pub unit: &'static str,
+    /// Its vertical axis.
+    pub axis: Axis,
+    /// The signals.
+    pub lines: Vec<Line>,
 }
 
 /// A whole figure.
 #[derive(Clone, Debug)]
-pub(super) struct Figure {
-    pub(super) title: String,
-    /// s
-    pub(super) times: Vec<f64>,
-    pub(super) panels: Vec<Panel>,
+pub struct Figure {
+    /// Over it all.
+    pub title: String,
+    /// Times of the values, s.
+    pub times: Vec<f64>,
+    /// From the top.
+    pub panels: Vec<Panel>,
 }

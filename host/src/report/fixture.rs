@@ -2,7 +2,7 @@
 
 use crate::Hand;
 use crate::plant::polyhedron::{Face, Polyhedron};
-use crate::record::sample::{ContactSample, Sample};
+use crate::record::sample::{ContactSample, EnergySample, Sample};
 use blindgrasp_shared::hand::{Fingertip, Joint, Link};
 use blindgrasp_shared::math::Real;
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
@@ -116,6 +116,7 @@ fn sample(t_s: f64) -> Sample {
             normal_force_n: desired * (1.0 - (-12.0 * t_s).exp()) + 0.15 * push + impact,
             desired_normal_force_n: desired,
             lambda_n: [0.3 * shear, 0.1 * push + 0.05],
+            torsion_nm: 0.0,
             indentation_m: 0.0012,
             point_m: tip - out * (TIP_RADIUS_M - 0.0012),
             frame: Matrix3::from_columns(&[turned, into, turned.cross(&into)]),
@@ -137,6 +138,7 @@ fn sample(t_s: f64) -> Sample {
         spin_rad_s: Vector3::new(0.05, 0.03, 0.1) * turn_speed,
         contacts: contacts.collect(),
         energy_j: 0.1,
+        energies: EnergySample::default(),
         mode: "grasping",
     }
 }

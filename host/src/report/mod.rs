@@ -32,24 +32,31 @@ mod palette;
 mod palm;
 mod pens;
 mod picture;
-mod plots;
+pub mod plots;
 mod quantise;
 mod raster;
 mod scene3d;
 mod series;
 mod skeleton;
 mod sketch;
+mod strip;
 pub mod sweep;
 #[cfg(test)]
 mod tests;
 mod text;
 
+pub use figure::{Axis, Figure, Line, Panel};
 pub use input::Report;
+pub use palette::{Rgb, of as colour};
+pub use pens::Dash;
 pub use sketch::{hand_svg, object_svg};
+pub use strip::Strip;
 
-use drawing::Drawing as _;
 use std::path::{Path, PathBuf};
 use std::{fs, io};
+
+/// A picture as a PNG file, and as an SVG file; or why it can't be drawn.
+pub type Files = [Result<Vec<u8>, String>; 2];
 
 /// Why a report could not be written. The message has the cause in it, so that it reads whole on its own.
 #[derive(Debug, thiserror::Error)]
@@ -97,8 +104,9 @@ pub fn write(dir: &Path, report: &Report<'_>) -> Result<(), ReportError> {
         }
     };
     for plot in plots::all(report.title, report.hand, report.joint_names, report.samples) {
-        save(format!("{}.png", plot.name), plot.figure.png())?;
-        save(format!("{}.svg", plot.name), plot.figure.svg())?;
+        for (ending, drawn) in ["png", "svg"].into_iter().zip(plot.figure.files()) {
+            save(format!("{}.{ending}", plot.name), drawn)?;
+        }
     }
     let stage = scene3d::Stage::new(report);
     for moment in [picture::Moment::Start, picture::Moment::End] {

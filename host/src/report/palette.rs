@@ -1,7 +1,7 @@
 //! Colours: the palette of Okabe and Ito, which people with any common colour blindness tell apart.
 
 /// A colour: red, green, blue.
-pub(super) type Rgb = [u8; 3];
+pub type Rgb = [u8; 3];
 
 pub(super) const BLUE: Rgb = [0, 114, 178];
 pub(super) const VERMILLION: Rgb = [213, 94, 0];
@@ -23,7 +23,7 @@ pub(super) const WHITE: Rgb = [255, 255, 255];
 const CYCLE: [Rgb; 7] = [BLUE, VERMILLION, GREEN, ORANGE, PURPLE, SKY, BLACK];
 
 /// The colour of the `k`-th line, or of finger `k`: the same in the plots and in the pictures.
-pub(super) fn of(k: usize) -> Rgb {
+pub fn of(k: usize) -> Rgb {
     CYCLE[k % CYCLE.len()]
 }
 

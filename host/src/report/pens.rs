@@ -13,14 +13,16 @@ pub(super) const LABEL_SIZE: i32 = 15;
 
 /// How a line is broken: pixels drawn and pixels left out.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum Dash {
+pub enum Dash {
+    /// Not broken.
     Solid,
+    /// Pixels drawn, pixels left out.
     Broken(f64, f64),
 }
 
 impl Dash {
     /// The dashes of the `k`-th of several lines, so that lines that coincide still show.
-    pub(super) fn of(k: usize) -> Self {
+    pub fn of(k: usize) -> Self {
         let broken = [(9.0, 4.0), (3.0, 3.0), (16.0, 5.0), (11.0, 11.0), (2.0, 7.0)];
         match k.checked_sub(1).and_then(|k| broken.get(k % broken.len())) {
             Some((on, off)) => Self::Broken(*on, *off),

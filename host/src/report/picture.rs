@@ -78,8 +78,8 @@ fn finger_table(canvas: &mut Canvas, report: &Report<'_>, sample: &Sample) {
 }
 
 /// A round length or force at the lower edge, drawn to scale, and what it is. Returns where its words end.
-fn scale_bar(canvas: &mut Canvas, left: i32, pixels_per_unit: f64, unit: &str) -> i32 {
-    let y = HEIGHT as i32 - 28;
+pub(super) fn scale_bar(canvas: &mut Canvas, left: i32, pixels_per_unit: f64, unit: &str) -> i32 {
+    let y = canvas.height as i32 - 28;
     let Some(value) = round_below(130.0 / pixels_per_unit) else { return left };
     let length = (value * pixels_per_unit) as f32;
     let (from, to, row) = (left as f32, left as f32 + length, y as f32);

@@ -16,10 +16,9 @@ pub(super) struct Plot {
 
 /// The four figures of a run.
 pub(super) fn all(title: &str, hand: &Hand, joint_names: &[String], samples: &[Sample]) -> [Plot; 4] {
-    let times: Vec<f64> = samples.iter().map(|sample| sample.t_s).collect();
     let figure = |what: &str, panels| {
         let title = if title.is_empty() { what.to_owned() } else { format!("{title}: {what}") };
-        Figure { title, times: times.clone(), panels }
+        figure(title, samples, panels)
     };
     [
         Plot {
@@ -32,8 +31,13 @@ pub(super) fn all(title: &str, hand: &Hand, joint_names: &[String], samples: &[S
     ]
 }
 
+/// A figure of some panels, over the times of the samples.
+pub fn figure(title: String, samples: &[Sample], panels: Vec<Panel>) -> Figure {
+    Figure { title, times: samples.iter().map(|sample| sample.t_s).collect(), panels }
+}
+
 /// A panel for the trunk, if there is one, and one for each finger. Fingers share their scale.
-fn joint_panels(hand: &Hand, names: &[String], samples: &[Sample]) -> Vec<Panel> {
+pub fn joint_panels(hand: &Hand, names: &[String], samples: &[Sample]) -> Vec<Panel> {
     let fingers_moved = |joint| (0..hand.fingertip_count()).filter(|&i| hand.moves(joint, i)).count();
     let own = |finger| {
         let joints = (0..hand.joint_count()).filter(move |&k| hand.moves(k, finger) && fingers_moved(k) == 1);
@@ -72,7 +76,8 @@ fn joint_panels(hand: &Hand, names: &[String], samples: &[Sample]) -> Vec<Panel>
     trunk.into_iter().chain(fingers.map(|finger| panel(finger, finger_range.clone()))).collect()
 }
 
-fn object_panels(samples: &[Sample]) -> Vec<Panel> {
+/// Velocity and angular velocity of the object.
+pub fn object_panels(samples: &[Sample]) -> Vec<Panel> {
     let panel = |heading: &str, quantity, unit, of: fn(&Sample) -> &Vector3<f64>| Panel {
         heading: heading.to_owned(),
         quantity,
@@ -101,7 +106,7 @@ fn of_contact(samples: &[Sample], finger: usize, value: impl Fn(&ContactSample) 
 }
 
 /// One panel for each finger, because the fingers of a symmetrical grasp press equally.
-fn force_panels(hand: &Hand, samples: &[Sample]) -> Vec<Panel> {
+pub fn force_panels(hand: &Hand, samples: &[Sample]) -> Vec<Panel> {
     let all = samples.iter().flat_map(|s| &s.contacts);
     let range = series::linear_range(
         all.flat_map(|c| [c.normal_force_n, c.desired_normal_force_n, c.tangential_force_n()]),
@@ -152,4 +157,33 @@ fn residual_panels(hand: &Hand, samples: &[Sample]) -> Vec<Panel> {
         panel("|Δλ₁|", "force residual", "N", |c| c.force_residual_n.norm()),
         panel("|Δλ₂|", "moment residual", "N m", |c| c.moment_residual_nm.norm()),
     ]
+}
+
+/// The components of the residuals in the contact frames, a panel for each finger: first those of the forces `Delta
+/// lambda_i1`, then those of the moments `Delta lambda_i2`. Panels of a kind share their scale.
+pub fn residual_component_panels(hand: &Hand, samples: &[Sample]) -> Vec<Panel> {
+    let kind = |heading: &str, quantity, unit, of: fn(&ContactSample) -> &Vector3<f64>| {
+        let all = samples.iter().flat_map(|s| s.contacts.iter().flat_map(|c| of(c).iter().copied()));
+        let range = series::linear_range(all);
+        let panels = (0..hand.fingertip_count()).map(|finger| Panel {
+            heading: format!("{heading}, finger {}", finger + 1),
+            quantity,
+            unit,
+            axis: Axis::Linear(range.clone()),
+            lines: ["X, along the face", "Y, normal", "Z, along the face"]
+                .into_iter()
+                .enumerate()
+                .map(|(k, name)| Line {
+                    name: name.to_owned(),
+                    colour: palette::of(k),
+                    dash: Dash::of(k),
+                    values: of_contact(samples, finger, |c| of(c)[k]),
+                })
+                .collect(),
+        });
+        panels.collect::<Vec<_>>()
+    };
+    let mut panels = kind("Δλ₁", "force residual", "N", |c| &c.force_residual_n);
+    panels.extend(kind("Δλ₂", "moment residual", "N m", |c| &c.moment_residual_nm));
+    panels
 }

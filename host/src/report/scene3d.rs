@@ -173,13 +173,14 @@ fn reach(samples: &[Sample]) -> Option<f64> {
 
 /// The hand at one sample; with all joints at zero without one.
 fn posture(hand: &Hand, sample: Option<&Sample>) -> Posture {
-    let mut angles = [0.0; MAX_JOINTS];
-    for (slot, angle) in angles.iter_mut().zip(sample.into_iter().flat_map(|sample| &sample.angles_rad)) {
-        *slot = *angle;
-    }
-    let mut posture = Posture::at_base();
-    hand.forward_kinematics(&angles, &mut posture);
-    posture
+    sample.map_or_else(
+        || {
+            let mut posture = Posture::at_base();
+            hand.forward_kinematics(&[0.0; MAX_JOINTS], &mut posture);
+            posture
+        },
+        |sample| sample.posture(hand),
+    )
 }
 
 /// Chooses the view for a run from its start, and from whether the fingers stay in front of the palm.

@@ -36,6 +36,7 @@ use injection::{Injection, Injections, Sensing};
 use motors::Motors;
 use nalgebra::Vector3;
 use observe::{Observer, Seen};
+use std::num::NonZeroU64;
 use std::time::Instant;
 use summary::{Ending, Summary, Tally};
 
@@ -53,7 +54,7 @@ pub enum SimulationError {
 /// A finished run.
 #[derive(Clone, Debug)]
 pub struct Run {
-    /// One sample a control tick.
+    /// One sample a control tick, unless [`Simulation::sample_every`] said otherwise.
     pub samples: Vec<Sample>,
     /// The first fault of the controller, and the number of the tick that found it.
     pub first_fault: Option<(u64, Raised)>,
@@ -80,6 +81,8 @@ pub struct Simulation<C = Alone> {
     joint_names: Vec<String>,
     ticks: u64,
     period_us: u64,
+    /// Ticks from one sample to the next.
+    sample_ticks: u64,
     motors: Motors,
     delayed: bool,
     /// The force `f_d` when all of it acts, N.
@@ -133,6 +136,7 @@ impl<C: Controller> Simulation<C> {
             joint_names: scene.joints.iter().map(|joint| joint.name.clone()).collect(),
             ticks: (scene.duration_s / scene.control.period_s).round() as u64,
             period_us: (scene.control.period_s * 1e6).round() as u64,
+            sample_ticks: 1,
             motors: Motors::new(scene),
             delayed: scene.actuators.output_delay_ticks > 0,
             force_n: scene.controller_config().law.force_n,
@@ -143,6 +147,11 @@ impl<C: Controller> Simulation<C> {
             controller,
             plant,
         })
+    }
+
+    /// Keeps one sample in so many ticks instead of one a tick, and that of the last.
+    pub fn sample_every(&mut self, ticks: NonZeroU64) {
+        self.sample_ticks = ticks.get();
     }
 
     /// Lets something go wrong.
@@ -214,7 +223,7 @@ impl<C: Controller> Simulation<C> {
                 tally.see(&sample);
                 keep(sample);
             };
-            if let Err(reason) = self.move_on(t_s, &wanted_nm, &stepped, record) {
+            if let Err(reason) = self.move_on(tick, &wanted_nm, &stepped, record) {
                 (lost, duration_s) = (Some(reason), reason.0);
                 break;
             }
@@ -255,10 +264,10 @@ impl<C: Controller> Simulation<C> {
         self.controller.step(&Turn { sensed, late: sensing.late, command, reach: sensing.reach })
     }
 
-    /// What the torques do in one control period that begins at `t_s`.
+    /// What the torques do in one control period.
     fn move_on(
         &mut self,
-        t_s: f64,
+        tick: u64,
         wanted_nm: &[f32; MAX_JOINTS],
         stepped: &Stepped,
         mut record: impl FnMut(Sample),
@@ -268,8 +277,13 @@ impl<C: Controller> Simulation<C> {
             (stepped.angles_rad.map(f64::from), stepped.speeds_rad_s.map(f64::from));
         let force_share = if self.force_n > 0.0 { f64::from(stepped.force_n / self.force_n) } else { 0.0 };
         let observer = &self.observer;
+        let t_s = self.time_s(tick);
+        let sampled = tick.is_multiple_of(self.sample_ticks) || tick == self.ticks;
         // 3, 4: actuate, plant; 5: record.
         let moved = self.motors.turn(&mut self.plant, wanted_nm, |plant, applied_nm| {
+            if !sampled {
+                return;
+            }
             let seen = Seen {
                 angles_rad: &angles_rad[..joints],
                 speeds_rad_s: &speeds_rad_s[..joints],

@@ -7,7 +7,7 @@
 //! no term is negative. Where the earlier law's `u_I` acts, its potential belongs to the energy too.
 
 use crate::plant::{Motion, Plant};
-use crate::record::sample::{ContactSample, Sample};
+use crate::record::sample::{ContactSample, EnergySample, Sample};
 use crate::{Hand, MAX_FINGERS, MAX_JOINTS};
 use blindgrasp_shared::control::{GraspLaw, Latch};
 use nalgebra::Vector3;
@@ -40,23 +40,38 @@ impl Observer {
         Self { law, latch: Latch::of(start.posture(), &start.motion().angles_rad) }
     }
 
-    /// Energy `E = K + V + sum(P_i)` (Eq. 40), J: of the whole law, also while its force is still growing.
-    pub fn energy_j(&self, plant: &Plant) -> f64 {
+    /// Energy at this instant, after the velocities were solved for. The potentials are those of the whole law, also while
+    /// its force is still growing.
+    pub fn energies(&self, plant: &Plant) -> EnergySample {
         let grip = self.law.grip(&self.latch);
         let Motion { angles_rad, speeds_rad_s, .. } = plant.motion();
         let (_, monitor) =
             self.law.torques(&plant.model().hand, plant.posture(), angles_rad, speeds_rad_s, Some(grip));
-        plant.kinetic_energy_j()
-            + plant.elastic_energy_j()
-            + monitor.approach_potential_j
-            + monitor.attitude_potential_j
-            + monitor.integral_potential_j
+        let flows = plant.flows();
+        let gains = self.law.damping_nm_s().iter();
+        EnergySample {
+            kinetic_j: plant.kinetic_energy_j(),
+            elastic_j: plant.elastic_energy_j(),
+            weight_j: plant.weight_energy_j(),
+            approach_j: monitor.approach_potential_j,
+            attitude_j: monitor.attitude_potential_j,
+            integral_j: monitor.integral_potential_j,
+            motors_j: flows.motors,
+            damping_j: gains.zip(&flows.joint_speeds_squared).map(|(gain, squares)| gain * squares).sum(),
+            indentation_j: flows.indentation,
+            torsion_j: flows.torsion,
+            friction_j: flows.friction,
+            joint_speeds_squared: flows.joint_speeds_squared.iter().sum(),
+            velocity_squared: flows.velocity_squared,
+            spin_squared: flows.spin_squared,
+        }
     }
 
     /// The plant at this instant, after its velocities were solved for.
     pub fn sample(&self, t_s: f64, plant: &Plant, seen: &Seen<'_>) -> Sample {
         let n = plant.model().hand.joint_count();
         let motion = plant.motion();
+        let energies = self.energies(plant);
         Sample {
             t_s,
             angles_rad: motion.angles_rad[..n].to_vec(),
@@ -69,7 +84,8 @@ impl Observer {
             velocity_m_s: motion.velocity_m_s,
             spin_rad_s: motion.spin_rad_s,
             contacts: self.contacts(plant, seen.force_share),
-            energy_j: self.energy_j(plant),
+            energy_j: energies.of_equation_40_j(),
+            energies,
             mode: seen.mode,
         }
     }
@@ -94,6 +110,7 @@ impl Observer {
                     normal_force_n: force.normal_n,
                     desired_normal_force_n: pull.y,
                     lambda_n: [force.lambda_x_n, force.lambda_z_n],
+                    torsion_nm: force.torsion_nm,
                     indentation_m: contact.indentation_m,
                     point_m: contact.point_m(centre),
                     frame: contact.frame,

@@ -4,10 +4,12 @@ use crate::plant::Lost;
 use crate::record::sample::{ContactSample, Sample};
 use serde::{Deserialize, Serialize};
 
-/// Below these everything counts as at rest.
-const REST_JOINT_SPEED_RAD_S: f64 = 1e-3;
-const REST_OBJECT_SPEED_M_S: f64 = 1e-4;
-const REST_OBJECT_SPIN_RAD_S: f64 = 1e-3;
+/// Below this a joint counts as at rest, rad/s.
+pub const REST_JOINT_SPEED_RAD_S: f64 = 1e-3;
+/// Below this the object counts as at rest, m/s, ...
+pub const REST_OBJECT_SPEED_M_S: f64 = 1e-4;
+/// ... if it turns more slowly than this, rad/s.
+pub const REST_OBJECT_SPIN_RAD_S: f64 = 1e-3;
 
 /// Summary of a run, as `--json` prints it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -152,7 +154,8 @@ impl Last {
     }
 }
 
-fn at_rest(sample: &Sample) -> bool {
+/// Whether everything is at rest, within the limits that [`Summary::settled`] names.
+pub fn at_rest(sample: &Sample) -> bool {
     fastest_joint(sample) < REST_JOINT_SPEED_RAD_S
         && sample.velocity_m_s.norm() < REST_OBJECT_SPEED_M_S
         && sample.spin_rad_s.norm() < REST_OBJECT_SPIN_RAD_S

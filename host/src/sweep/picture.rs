@@ -3,7 +3,8 @@
 use super::axis::{Axis, Scale};
 use super::plan::Plan;
 use super::run::{Outcome, Row};
-use crate::report::sweep::{Curve, Dot, Files, Map, Mark, Spread, Variable};
+use crate::report::Files;
+use crate::report::sweep::{Curve, Dot, Map, Mark, Spread, Variable};
 
 /// Listed numbers that are further apart than this lie by their logarithms.
 const MOST_LINEAR: f64 = 50.0;

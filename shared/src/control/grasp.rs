@@ -206,6 +206,11 @@ impl<T: Real, const J: usize> GraspLaw<T, J> {
         &self.gains
     }
 
+    /// `C` of each joint, N m s/rad.
+    pub fn damping_nm_s(&self) -> &[T; J] {
+        &self.damping_nm_s
+    }
+
     /// The whole grip, as configured.
     pub fn grip<'a, const F: usize>(&self, latch: &'a Latch<T, J, F>) -> Grip<'a, T, J, F> {
         Grip { latch, gains: self.gains }

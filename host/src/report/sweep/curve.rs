@@ -5,9 +5,10 @@ use super::super::drawing::{self, Drawing, TITLE_HEIGHT, WIDTH};
 use super::super::palette::{BLUE, FAINT_INK, Rgb, VERMILLION, WHITE, mix};
 use super::super::pens::{ink, pen, reason};
 use super::super::series;
+use super::Mark;
 use super::key::{self, Key};
 use super::variable::{Along, Spread, Variable, round_powers};
-use super::{Files, Mark};
+use crate::report::Files;
 use plotters::coord::Shift;
 use plotters::prelude::{
     Circle, DrawingArea, DrawingBackend, EmptyElement, LineSeries, PathElement, Rectangle,

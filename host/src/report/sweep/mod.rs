@@ -24,6 +24,3 @@ pub enum Mark {
     /// The scene refused the values.
     Refused,
 }
-
-/// A picture as a PNG file, and as an SVG file; or why it can't be drawn.
-pub type Files = [Result<Vec<u8>, String>; 2];

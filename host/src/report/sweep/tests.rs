@@ -2,6 +2,7 @@
 
 use super::super::{pens::LABEL_SIZE, text};
 use super::*;
+use crate::report::Files;
 use std::collections::BTreeMap;
 
 fn svg(files: Files) -> String {

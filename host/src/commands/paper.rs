@@ -1,0 +1,94 @@
+//! `blindgrasp paper`: every table, figure and claim of the paper, run and checked.
+
+use super::Outcome;
+use anyhow::Context;
+use blindgrasp::paper::claim::{Claim, Verdict};
+use blindgrasp::paper::expected::Surprise;
+use blindgrasp::paper::files;
+use blindgrasp::paper::report::{self, Paper};
+use blindgrasp::record::run_dir::RunDir;
+use clap::Args;
+use indicatif::{ProgressBar, ProgressStyle};
+use std::fmt::Write as _;
+use std::io::{self, Write as _};
+use std::path::PathBuf;
+
+/// Run the simulation and the experiments of the paper, and check each of its claims
+///
+/// Exit code 0: every claim that the documentation calls reproduced is; 1: one is not; 2: bad input or usage.
+#[derive(Args)]
+pub(crate) struct Arguments {
+    /// Write the report (paper.html), figures, traces and claims.json to this directory
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// Overwrite a report in the directory
+    #[arg(long, requires = "out")]
+    force: bool,
+    /// Print claims, figures' data, sweeps and choices as one JSON object
+    #[arg(long)]
+    json: bool,
+}
+
+/// Runs the command.
+pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
+    let directory = arguments.out.as_ref().map(|path| RunDir::choose(path, arguments.force)).transpose()?;
+    let bar = ProgressBar::new(report::runs() as u64);
+    let style = "{bar:40} {pos} of {len} runs in {elapsed}  {msg}";
+    bar.set_style(ProgressStyle::with_template(style).unwrap_or_else(|_| ProgressStyle::default_bar()));
+    let paper = Paper::reproduce(&|name| {
+        bar.set_message(name.to_owned());
+        bar.inc(1);
+    })?;
+    bar.finish_and_clear();
+    let text = if arguments.json { paper.json().to_string() + "\n" } else { table(&paper) };
+    io::stdout().lock().write_all(text.as_bytes()).context("cannot print the claims")?;
+    if let Some(directory) = &directory {
+        files::write(directory, &paper)?;
+        eprintln!("blindgrasp: wrote {}", directory.path().display());
+    }
+    eprintln!("blindgrasp: {} runs in {:.0} s on {} cores", report::runs(), paper.wall_s, paper.cores);
+    Ok(if paper.failed() { Outcome::Failed } else { Outcome::Shown })
+}
+
+/// The claims as a table.
+fn table(paper: &Paper) -> String {
+    let mut text = String::new();
+    for claim in &paper.claims {
+        describe(&mut text, claim);
+    }
+    let rows = || paper.claims.iter().flat_map(|claim| &claim.rows);
+    for verdict in [Verdict::Reproduced, Verdict::Differs, Verdict::NotReproduced] {
+        let count = rows().filter(|row| row.verdict == verdict).count();
+        let _ = writeln!(text, "{:<24}{count}", verdict.words());
+    }
+    for surprise in &paper.surprises {
+        let _ = writeln!(text, "{}", surprising(surprise));
+    }
+    if paper.surprises.is_empty() {
+        text += "Every verdict is the one that the documentation states.\n";
+    }
+    text
+}
+
+fn describe(text: &mut String, claim: &Claim) {
+    let _ = writeln!(text, "{} ({})\n  if {}", claim.words, claim.place, claim.criterion);
+    for row in &claim.rows {
+        let _ = writeln!(text, "  {:<26}{:<22}{}", row.run, row.verdict.words(), row.measured);
+        if !row.remark.is_empty() {
+            let _ = writeln!(text, "  {:<48}{}", "", row.remark);
+        }
+    }
+    text.push('\n');
+}
+
+fn surprising(surprise: &Surprise) -> String {
+    let words = |verdict: Option<Verdict>| verdict.map_or("nothing", Verdict::words);
+    format!(
+        "{}, claim `{}` in run `{}`: {}, where the documentation states {}",
+        if surprise.is_worse() { "WORSE" } else { "better" },
+        surprise.claim,
+        surprise.run,
+        words(surprise.found),
+        words(surprise.expected)
+    )
+}

@@ -1,0 +1,93 @@
+//! The plant's ledger: stored energy, what dampers and friction take, and the work of the motors make a whole in every built-in
+//! scene, and what is missing is the integrator's error.
+
+use blindgrasp::record::sample::{EnergySample, Sample};
+use blindgrasp::scene::Scene;
+use blindgrasp::sim::{Run, Simulation};
+use blindgrasp_tests::numeric::order;
+
+fn run(scene: &str, settings: &[&str]) -> Run {
+    let settings: Vec<String> = settings.iter().map(|&setting| setting.to_owned()).collect();
+    let scene = Scene::load(scene, &settings).unwrap_or_else(|error| panic!("{error}"));
+    Simulation::new(&scene).expect("the scene can be simulated").run(|_| {})
+}
+
+/// What is missing at a sample, J.
+fn missing_j(first: &EnergySample, now: &EnergySample) -> f64 {
+    now.stored_j() - first.stored_j() + now.dissipated_j() - now.motors_j
+}
+
+fn most_missing_j(samples: &[Sample]) -> f64 {
+    let first = samples[0].energies;
+    samples.iter().map(|sample| missing_j(&first, &sample.energies).abs()).fold(0.0, f64::max)
+}
+
+/// The energy that changed its place, J: what moves, is squeezed, is dissipated, or is done by the motors besides holding weight.
+fn exchanged_j(samples: &[Sample]) -> f64 {
+    let first = samples[0].energies;
+    samples
+        .iter()
+        .map(|sample| {
+            let now = sample.energies;
+            let inside = now.kinetic_j + now.elastic_j - first.kinetic_j - first.elastic_j;
+            let motors = now.motors_j - (now.weight_j - first.weight_j);
+            inside.abs().max(now.dissipated_j()).max(motors.abs())
+        })
+        .fold(0.0, f64::max)
+}
+
+/// Tolerance: a thousandth of the energy exchanged, at every tick.
+#[test]
+fn the_ledger_closes_in_every_built_in_scene() {
+    for name in Scene::built_in() {
+        let samples = run(name, &["duration_s=2.0"]).samples;
+        let (missing, exchanged) = (most_missing_j(&samples), exchanged_j(&samples));
+        println!(
+            "{name}: misses {missing:.1e} J of {exchanged:.1e} J exchanged ({:.1e})",
+            missing / exchanged
+        );
+        assert!(missing <= 1e-3 * exchanged, "{name}");
+        assert_eq!(samples[0].energies.dissipated_j(), 0.0, "nothing has flowed at the start");
+    }
+}
+
+/// Tolerance: an order of at least 1.8; the largest miss need not be in the same tick with both steps.
+#[test]
+fn what_the_ledger_misses_has_the_order_of_the_integrator() {
+    for name in ["prism-ideal", "cube-ideal", "prism", "hand-arm"] {
+        let [coarse, fine] = ["plant.substep_s=1e-4", "plant.substep_s=5e-5"]
+            .map(|substep| most_missing_j(&run(name, &["duration_s=1.0", substep]).samples));
+        println!("{name}: {coarse:.1e} J, with half the step {fine:.1e} J: order {:.2}", order(coarse, fine));
+        // Friction that begins to slide within a step is of first order there, and small.
+        assert!(order(coarse, fine) > if name == "prism" { 0.9 } else { 1.8 }, "{name}");
+    }
+}
+
+/// Dampers take and never give; friction gives back at most what its springs hold.
+#[test]
+fn dampers_and_friction_only_take() {
+    for name in ["cube", "prism", "cube-ideal"] {
+        let settings = ["duration_s=1.5".to_owned()];
+        let scene = Scene::load(name, &settings).unwrap_or_else(|error| panic!("{error}"));
+        let springs_j: f64 = scene
+            .joints
+            .iter()
+            .map(|joint| 0.5 * joint.friction.coulomb_nm * joint.friction.presliding_rad)
+            .sum();
+        let samples = Simulation::new(&scene).expect("the scene can be simulated").run(|_| {}).samples;
+        let mut most = 0.0_f64;
+        for pair in samples.windows(2) {
+            let (before, now) = (pair[0].energies, pair[1].energies);
+            assert!(now.indentation_j >= before.indentation_j && now.torsion_j >= before.torsion_j, "{name}");
+            assert!(
+                now.damping_j >= before.damping_j && now.joint_speeds_squared >= before.joint_speeds_squared
+            );
+            most = most.max(now.friction_j);
+            assert!(
+                now.friction_j >= most - springs_j,
+                "{name}: {} J of {springs_j} J",
+                most - now.friction_j
+            );
+        }
+    }
+}
