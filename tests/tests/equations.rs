@@ -91,12 +91,14 @@ fn defines(text: &str, name: &str) -> bool {
     })
 }
 
-/// Whether a text has a test of this name that is run: `#[test]` among the attributes before the function, and no `#[ignore]`.
+/// Whether a text has a test of this name that is run: `#[test]` among the attributes before the function, and no `#[ignore]`
+/// except for those of which `tests/run` sees to what they need.
 fn tests(text: &str, name: &str) -> bool {
     let lines: Vec<&str> = text.lines().map(str::trim).collect();
     lines.iter().enumerate().filter(|(_, line)| line.starts_with(&format!("fn {name}("))).any(|(at, _)| {
         let attributes = || lines[..at].iter().rev().take_while(|line| line.starts_with("#["));
-        attributes().any(|line| *line == "#[test]") && !attributes().any(|line| line.starts_with("#[ignore"))
+        attributes().any(|line| *line == "#[test]")
+            && !attributes().any(|line| line.starts_with("#[ignore") && !line.contains("tests/run"))
     })
 }
 
