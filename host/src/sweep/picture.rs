@@ -14,13 +14,30 @@ pub(super) fn is_drawn(plan: &Plan) -> bool {
     (1..=2).contains(&plan.axes().len())
 }
 
-/// The picture of a sweep, as a PNG file and as an SVG file: over one key a curve, over two a map; none over more.
-pub fn draw(plan: &Plan, rows: &[Row]) -> Option<Files> {
+/// The picture of a sweep.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Picture {
+    /// Over one key.
+    Curve(Curve),
+    /// Over two.
+    Map(Map),
+}
+
+/// The picture of a sweep: over one key a curve, over two a map; none over more.
+pub fn picture(plan: &Plan, rows: &[Row]) -> Option<Picture> {
     match plan.axes() {
-        [x] => Some(curve(plan, rows, x).files()),
-        [x, y] => Some(map(plan, rows, x, y).files()),
+        [x] => Some(Picture::Curve(curve(plan, rows, x))),
+        [x, y] => Some(Picture::Map(map(plan, rows, x, y))),
         _ => None,
     }
+}
+
+/// The [`picture`] of a sweep, as a PNG file and as an SVG file.
+pub fn draw(plan: &Plan, rows: &[Row]) -> Option<Files> {
+    picture(plan, rows).map(|picture| match picture {
+        Picture::Curve(curve) => curve.files(),
+        Picture::Map(map) => map.files(),
+    })
 }
 
 fn curve(plan: &Plan, rows: &[Row], x: &Axis) -> Curve {

@@ -57,7 +57,7 @@ fn panels(chart: &Figure) -> Result<Markup, String> {
 }
 
 /// The element with what it shows in words.
-fn described(svg: &str, words: &str) -> String {
+pub(super) fn described(svg: &str, words: &str) -> String {
     let label = html! { svg role="img" aria-label=(words) {} }.into_string();
     svg.replacen("<svg ", &label.replace("></svg>", " "), 1)
 }
