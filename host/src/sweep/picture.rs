@@ -106,11 +106,13 @@ fn spread(axis: &Axis) -> Spread {
 /// A curve needs no even steps: in it, listed numbers lie where they belong.
 fn curve_spread(axis: &Axis) -> Spread {
     let numbers = numbers(axis);
-    let (low, high) =
-        numbers.iter().fold((f64::INFINITY, 0.0), |(low, high): (f64, f64), v| (low.min(*v), high.max(*v)));
+    let positive = || numbers.iter().copied().filter(|number| *number > 0.0);
+    let is_wide = positive().fold(0.0, f64::max) > MOST_LINEAR * positive().fold(f64::INFINITY, f64::min);
     match axis.scale {
         Scale::Listed if !axis.is_numeric() => Spread::Listed,
-        Scale::Listed if low > 0.0 && high > MOST_LINEAR * low => Spread::Logarithmic(numbers),
+        Scale::Listed if is_wide && numbers.iter().all(|number| *number >= 0.0) => {
+            Spread::Logarithmic(numbers)
+        }
         Scale::Listed => Spread::Linear(numbers),
         _ => spread(axis),
     }

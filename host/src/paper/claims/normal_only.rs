@@ -79,7 +79,8 @@ fn region_row(sweep: &Sweep, explained: bool) -> Row {
     let usual = stretches.iter().any(|s| s.held && (s.from..=s.to).contains(&TABLE_VII_NM));
     let all_above = usual && lost().all(|stretch| stretch.to < TABLE_VII_NM);
     let lost_without = lost().any(|stretch| stretch.from == 0.0);
-    let (sampled, friction) = (explained && SAMPLED.contains(&sweep.varied.name), sweep.has_friction());
+    let (sampled, friction) =
+        (explained && lost_without && SAMPLED.contains(&sweep.varied.name), sweep.has_friction());
     let holds = all_above && lost_without;
     let remark = match (holds, friction, sampled) {
         (false, true, _) => "with the friction of the joints it is held without u_st too",

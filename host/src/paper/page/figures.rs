@@ -96,6 +96,16 @@ fn key(line: &Line) -> Markup {
     }
 }
 
+/// The last picture of a strip, without a caption.
+pub(super) fn last_picture(drawn: &Drawn, words: &str) -> Result<Option<Markup>, String> {
+    let Drawing::Strip(strip) = &drawn.drawing else { return Ok(None) };
+    let Some(png) = strip.times_s.len().checked_sub(1).and_then(|last| strip.picture_png(last)) else {
+        return Ok(None);
+    };
+    let source = format!("data:image/png;base64,{}", STANDARD.encode(png?));
+    Ok(Some(html! { img.hero src=(source) width="480" height="400" alt=(words); }))
+}
+
 fn pictures(title: &str, strip: &Strip) -> Result<Markup, String> {
     let files: Vec<(f64, String)> = strip
         .times_s

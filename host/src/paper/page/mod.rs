@@ -22,6 +22,9 @@ const STYLE: &str = include_str!("style.css");
 pub(super) fn page(paper: &Paper) -> Result<String, String> {
     let figures = figures::section(&paper.figures)?;
     let sweeps = sweeps::section(&paper.sweeps)?;
+    let cube = paper.figures.iter().find(|drawn| drawn.file == "fig-13-cube-pictures");
+    let words = "The hand of the experiments holds the cube";
+    let picture = cube.map(|drawn| figures::last_picture(drawn, words)).transpose()?.flatten();
     let page = html! {
         (DOCTYPE)
         html lang="en" {
@@ -40,7 +43,10 @@ pub(super) fn page(paper: &Paper) -> Result<String, String> {
                         ": its simulation and its experiments, simulated with the controller of blindgrasp; the counterparts of its \
                          figures; and each of its claims with what was measured."
                     }
-                    (summary::summary(paper))
+                    div.opening {
+                        (summary::summary(paper))
+                        @if let Some(picture) = &picture { (picture) }
+                    }
                     (claims::tally(paper))
                     nav aria-label="Sections" {
                         ul {

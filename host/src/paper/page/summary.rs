@@ -5,6 +5,7 @@ use crate::paper::claim::{Verdict, number};
 use crate::paper::evidence::Done;
 use crate::paper::report::Paper;
 use crate::paper::sensitivity::Limits;
+use crate::sweep::Value;
 use maud::{Markup, html};
 
 pub(super) fn summary(paper: &Paper) -> Markup {
@@ -81,7 +82,7 @@ fn friction(paper: &Paper) -> Sentence {
     let lost = below?.lost;
     let numbers = format!(
         "At 1 kHz, with encoders and a tick of delay, the cube is lost below {} of what is assumed.",
-        number(lost)
+        Value::number(lost).text
     );
     Some((Verdict::Differs, "The experiments need friction in the joints.", numbers))
 }

@@ -18,7 +18,8 @@ pub(super) fn section(sweeps: &[Sweep]) -> Result<Markup, String> {
         "sensitivity",
         html! {
             p.faint {
-                "One quantity at a time, up to where the grasp fails; that point is bisected to a tenth of its value. "
+                "One quantity at a time, up to where the grasp fails: a fingertip leaves its face, or rolls off it. That point is bisected to \
+                 a tenth of its value. The model's fingertips never slip. "
                 code { "blindgrasp sweep SCENE --vary KEY=VALUES --set KEY=VALUE --refine 0.1" } " does any of them."
             }
             (overview(&curves))
@@ -66,8 +67,8 @@ fn limit(sweep: &Sweep, edge: Option<Edge>, direction: &str, extreme: fn(f64, f6
         Some(Edge { held, lost }) => {
             let (many, of) = if held < usual { (usual / held, "less") } else { (held / usual, "more") };
             html! {
-                span.lost { (text(lost)) } " " span.faint { "held at " (text(held)) }
-                @if many > 1.0 && many.is_finite() { span.remark { (number(many)) " times " (of) " than the scene has" } }
+                span.lost { (text(lost)) } " " span.faint { "(held at " (text(held)) ")" }
+                @if many > 1.0 && many.is_finite() { span.remark { (number(many)) " times " (of) } }
             }
         }
         None => {
@@ -164,14 +165,15 @@ fn runs_of(sweep: &Sweep) -> Markup {
     let unit = if sweep.unit().is_empty() { String::new() } else { format!(", {}", sweep.unit()) };
     html! {
         details {
-            summary { (rows.len()) " runs" }
+            summary { (rows.len()) " runs, with the largest ratio of tangential to normal force at the end" }
             table {
-                thead { tr { th.number scope="col" { "Value" (unit) } th scope="col" { "Grasp" } } }
+                thead { tr { th.number scope="col" { "Value" (unit) } th scope="col" { "Grasp" } th.number scope="col" { "Ratio" } } }
                 tbody {
                     @for (value, row) in rows {
                         tr {
                             th.number scope="row" { (text(value)) @if Some(value) == sweep.varied.usual { " \u{25c2}" } }
                             td { @if let Some(summary) = row.summary() { (ended(summary)) } @else { "refused" } }
+                            td.number { @if let Some(ratio) = row.summary().and_then(ratio) { (number(ratio)) } @else { "\u{2013}" } }
                         }
                     }
                 }
@@ -188,4 +190,11 @@ fn ended(summary: &Summary) -> Markup {
             (None, None) => { span.held { "\u{2713} held" } ", moving" },
         }
     }
+}
+
+/// The largest ratio of tangential to normal force at the end of a run that was held.
+fn ratio(summary: &Summary) -> Option<f64> {
+    let forces = summary.last.tangential_force_n.iter().zip(&summary.last.normal_force_n);
+    let ratio = forces.map(|(tangential, normal)| tangential / normal).reduce(f64::max)?;
+    summary.grasp_held.then_some(ratio)
 }
