@@ -29,6 +29,14 @@ pub enum EvidenceError {
         /// What is wrong with its model or gains.
         cause: SimulationError,
     },
+    /// A sweep.
+    #[error("sweep `{sweep}`: {cause}")]
+    Sweep {
+        /// The sweep.
+        sweep: &'static str,
+        /// What is wrong with it.
+        cause: String,
+    },
     /// A name that no run has.
     #[error("no run is called `{0}`")]
     Missing(String),
