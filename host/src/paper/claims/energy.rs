@@ -32,7 +32,9 @@ pub(super) fn balance(evidence: &Evidence) -> Result<Claim, EvidenceError> {
 /// The largest energy that the balance misses at a tick, and what was exchanged, J.
 fn missed(samples: &[Sample]) -> (f64, f64) {
     let Some(first) = samples.first().map(|sample| sample.energies) else { return (0.0, 0.0) };
-    let missed = |now: &EnergySample| now.stored_j() - first.stored_j() + now.dissipated_j() - now.motors_j;
+    let missed = |now: &EnergySample| {
+        now.stored_j() - first.stored_j() + now.dissipated_j() - now.motors_j - now.pushes_j
+    };
     let exchanged = |now: &EnergySample| {
         let weight = now.weight_j - first.weight_j;
         let inside = now.stored_j() - first.stored_j() - weight;
