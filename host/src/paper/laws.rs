@@ -9,8 +9,8 @@ use serde::Serialize;
 
 /// `K_st` of Table VII, N m.
 pub const ATTITUDE_STIFFNESS_NM: f64 = 5e-3;
-/// `K_I` where one is taken for many objects, N m/rad. References 14 and 15 are not at hand, and the paper prints none: it is four
-/// times the least with which the cube is held (of the gains of [`super::earlier`]), as `K_st` of Table VII is of its own least.
+/// `K_I` where one is taken for many objects, N m/rad: the paper prints none. It is five times the least with which the cube is
+/// held (between 2e-3 and 4e-3, in the sweeps), where `K_st` of Table VII is three times its own least.
 pub const INTEGRAL_GAIN_NM_RAD: f64 = 2e-2;
 /// How often the law acts where it is as near to the continuous time of the theory as the tick goes, s.
 const CONTINUOUS_S: f64 = 1e-4;

@@ -12,13 +12,19 @@ struct Quantity {
     words: &'static str,
     unit: &'static str,
     of: fn(&Final) -> f64,
-    decades: bool,
+    is_wide: bool,
 }
 
-const QUANTITIES: [Quantity; 3] = [
-    Quantity { words: "moved by", unit: "m", of: Final::distance_m, decades: true },
-    Quantity { words: "turned by", unit: "rad", of: Final::turn_rad, decades: true },
-    Quantity { words: "normal force, off Eq. 57", unit: "1", of: Final::off_equation_57, decades: true },
+const QUANTITIES: [Quantity; 4] = [
+    Quantity { words: "moved along y", unit: "m", of: |end| end.moved_m[1], is_wide: false },
+    Quantity { words: "turned by", unit: "rad", of: Final::turn_rad, is_wide: false },
+    Quantity {
+        words: "force, finger 1",
+        unit: "N",
+        of: |end| end.normal_force_n.first().copied().unwrap_or(f64::NAN),
+        is_wide: false,
+    },
+    Quantity { words: "off Eq. 57", unit: "1", of: Final::off_equation_57, is_wide: true },
 ];
 
 impl Comparison {
@@ -30,7 +36,7 @@ impl Comparison {
             let values = || {
                 lines.iter().flat_map(|(_, lines)| lines.iter().flat_map(|line| line.values.iter().copied()))
             };
-            let axis = if quantity.decades { Axis::decades(values()) } else { Axis::linear(values()) };
+            let axis = if quantity.is_wide { Axis::decades(values()) } else { Axis::linear(values()) };
             let panel = |(law, lines): &(Law, Vec<Line>)| Panel {
                 heading: law.words().to_owned(),
                 quantity: quantity.words,
@@ -52,7 +58,7 @@ impl Comparison {
             caption: format!(
                 "The cube in the paper's model, under the paper's law and under the one before it, at the end of 14 s. On its way it is \
                  pushed with half a newton from 2 s to 3 s, or not. Lines that lie on one another: the end does not depend on the way. \
-                 A gap: lost. Without a gain every grasp is lost{}. Damping is ten times that of Table VII, so that the end is seen; f_d = \
+                 What has no line was lost; what is far off Eq. 57 under u_s + u_st still moves. Without a gain every grasp is lost{}. Damping is ten times that of Table VII, so that the end is seen; f_d = \
                  5 N; law every ms; no joint friction.",
                 if self.ends(Law::NormalOnly, 0.0).any(Final::held) { " but some" } else { "" }
             ),

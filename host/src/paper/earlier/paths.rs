@@ -39,6 +39,9 @@ const SETTINGS: [&str; 2] = ["duration_s=14", "control.damping_scale=10"];
 const PUSHED_FROM_S: f64 = 2.0;
 const PUSHED_FOR_S: f64 = 1.0;
 const RISE_S: f64 = 0.2;
+/// A fastest joint below this counts as near enough to rest, rad/s: it would need minutes to move the object as far as the laws
+/// differ.
+const SLOW_RAD_S: f64 = 1e-2;
 /// Ticks from one sample to the next.
 const SAMPLE_TICKS: u64 = 20;
 
@@ -77,6 +80,11 @@ impl Final {
         self.lost.is_none()
     }
 
+    /// Whether it held, and came near enough to rest to show where and with which forces.
+    pub fn rests(&self) -> bool {
+        self.held() && self.joint_speed_max_rad_s < SLOW_RAD_S
+    }
+
     /// How far the object is from where it was at the start, m.
     pub fn distance_m(&self) -> f64 {
         Vector3::from(self.moved_m).norm()
@@ -90,7 +98,8 @@ impl Final {
     /// The largest difference of a normal force from Eq. 57, as a part of it.
     pub fn off_equation_57(&self) -> f64 {
         let forces = self.normal_force_n.iter().zip(&self.equation_57_n);
-        forces.map(|(force, foretold)| (force / foretold - 1.0).abs()).fold(0.0, f64::max)
+        let off = forces.map(|(force, foretold)| (force / foretold - 1.0).abs());
+        off.fold(0.0, |most, off| if off > most || off.is_nan() { off } else { most })
     }
 
     fn of(law: Law, gain: f64, path: &Path, scene: &Scene, run: &Run) -> Self {
