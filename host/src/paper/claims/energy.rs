@@ -45,7 +45,9 @@ struct Missed {
 fn missed(samples: &[Sample]) -> Missed {
     let Some(first) = samples.first() else { return Missed::default() };
     let (start_s, first) = (first.t_s, first.energies);
-    let missed = |now: &EnergySample| now.stored_j() - first.stored_j() + now.dissipated_j() - now.motors_j;
+    let missed = |now: &EnergySample| {
+        now.stored_j() - first.stored_j() + now.dissipated_j() - now.motors_j - now.pushes_j
+    };
     let exchanged = |now: &EnergySample| {
         let weight = now.weight_j - first.weight_j;
         let inside = now.stored_j() - first.stored_j() - weight;
