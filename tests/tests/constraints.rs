@@ -136,9 +136,8 @@ impl Equations {
         let mut h = [[0.0; MAX_JOINTS]; MAX_JOINTS];
         model.hand.forward_kinematics(&motion.angles_rad, &mut posture);
         place_bodies(&model.hand, &posture, &mut bodies);
-        mass_matrix(&model.hand, &posture, &bodies, &mut h);
-        let hand_bias =
-            bias_torques(&model.hand, &posture, &bodies, &motion.speeds_rad_s, &model.hand_gravity_m_s2);
+        mass_matrix(&model.hand, &bodies, &mut h);
+        let hand_bias = bias_torques(&model.hand, &bodies, &motion.speeds_rad_s, &model.hand_gravity_m_s2);
 
         let r: Matrix3<f64> = motion.attitude.to_rotation_matrix().into_inner();
         let inertia = r * model.object.inertia_kg_m2 * r.transpose();

@@ -33,8 +33,8 @@ fn placed(hand: &Hand, angles_rad: &JointVector) -> (Posture, [Body; MAX_JOINTS]
 
 fn mass(hand: &Hand, angles_rad: &JointVector) -> DMatrix<f64> {
     let mut h: JointMatrix = [[0.0; MAX_JOINTS]; MAX_JOINTS];
-    let (posture, bodies) = placed(hand, angles_rad);
-    mass_matrix(hand, &posture, &bodies, &mut h);
+    let bodies = placed(hand, angles_rad).1;
+    mass_matrix(hand, &bodies, &mut h);
     DMatrix::from_fn(hand.joint_count(), hand.joint_count(), |j, k| h[j][k])
 }
 
@@ -44,8 +44,8 @@ fn bias(
     speeds_rad_s: &JointVector,
     gravity_m_s2: &Vector3<f64>,
 ) -> DVector<f64> {
-    let (posture, bodies) = placed(hand, angles_rad);
-    let torques = bias_torques(hand, &posture, &bodies, speeds_rad_s, gravity_m_s2);
+    let bodies = placed(hand, angles_rad).1;
+    let torques = bias_torques(hand, &bodies, speeds_rad_s, gravity_m_s2);
     DVector::from_column_slice(&torques[..hand.joint_count()])
 }
 

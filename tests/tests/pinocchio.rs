@@ -31,8 +31,8 @@ fn values(hand: &Hand, angles_rad: &[f64; MAX_JOINTS]) -> Value {
     hand.forward_kinematics(angles_rad, &mut posture);
     place_bodies(hand, &posture, &mut bodies);
     let mut mass: JointMatrix = [[0.0; MAX_JOINTS]; MAX_JOINTS];
-    mass_matrix(hand, &posture, &bodies, &mut mass);
-    let weight = bias_torques(hand, &posture, &bodies, &[0.0; MAX_JOINTS], &Vector3::from(GRAVITY_M_S2));
+    mass_matrix(hand, &bodies, &mut mass);
+    let weight = bias_torques(hand, &bodies, &[0.0; MAX_JOINTS], &Vector3::from(GRAVITY_M_S2));
     let fingertips: Vec<Value> = (0..hand.fingertip_count())
         .map(|i| {
             let (linear, angular) = hand.jacobians(&posture, i);

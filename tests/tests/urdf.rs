@@ -58,12 +58,12 @@ impl<'a> Placed<'a> {
 
     fn mass(&self) -> DMatrix<f64> {
         let mut h: JointMatrix = [[0.0; MAX_JOINTS]; MAX_JOINTS];
-        mass_matrix(self.hand, &self.posture, &self.bodies, &mut h);
+        mass_matrix(self.hand, &self.bodies, &mut h);
         DMatrix::from_fn(self.hand.joint_count(), self.hand.joint_count(), |j, k| h[j][k])
     }
 
     fn weight(&self) -> DMatrix<f64> {
-        let torques = bias_torques(self.hand, &self.posture, &self.bodies, &[0.0; MAX_JOINTS], &GRAVITY_M_S2);
+        let torques = bias_torques(self.hand, &self.bodies, &[0.0; MAX_JOINTS], &GRAVITY_M_S2);
         DMatrix::from_column_slice(self.hand.joint_count(), 1, &torques[..self.hand.joint_count()])
     }
 }

@@ -16,6 +16,9 @@ pub type JointMatrix = [[f64; MAX_JOINTS]; MAX_JOINTS];
 /// A link in the base frame.
 #[derive(Clone, Copy, Debug)]
 pub struct Body {
+    /// Of the joint before it: unit vector, and a point on it, m.
+    axis: Vector3<f64>,
+    origin_m: Vector3<f64>,
     mass_kg: f64,
     centre_m: Vector3<f64>,
     /// About the mass centre.
@@ -25,9 +28,10 @@ pub struct Body {
 impl Body {
     /// No body: fills the unused capacity.
     pub const NONE: Body =
-        Body { mass_kg: 0.0, centre_m: Vector3::new(0.0, 0.0, 0.0), inertia_kg_m2: ZERO_INERTIA };
+        Body { axis: ZERO, origin_m: ZERO, mass_kg: 0.0, centre_m: ZERO, inertia_kg_m2: ZERO_INERTIA };
 }
 
+const ZERO: Vector3<f64> = Vector3::new(0.0, 0.0, 0.0);
 const ZERO_INERTIA: Matrix3<f64> = Matrix3::new(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0);
 
 /// Places the hand's links.
@@ -35,6 +39,8 @@ pub fn place_bodies(hand: &Hand, posture: &Posture, bodies: &mut [Body; MAX_JOIN
     for k in 0..hand.joint_count() {
         let (link, pose) = (hand.link(k), posture.link(k));
         bodies[k] = Body {
+            axis: pose.axis(),
+            origin_m: pose.origin_m,
             mass_kg: link.mass_kg,
             centre_m: pose.point(&link.mass_centre_m),
             inertia_kg_m2: pose.attitude * link.inertia_kg_m2 * pose.attitude.transpose(),
@@ -43,7 +49,7 @@ pub fn place_bodies(hand: &Hand, posture: &Posture, bodies: &mut [Body; MAX_JOIN
 }
 
 /// Mass matrix `H(q)`, kg m^2: composite rigid bodies. Only the entries of joints on one branch are written.
-pub fn mass_matrix(hand: &Hand, posture: &Posture, bodies: &[Body; MAX_JOINTS], h: &mut JointMatrix) {
+pub fn mass_matrix(hand: &Hand, bodies: &[Body; MAX_JOINTS], h: &mut JointMatrix) {
     // What a joint carries: mass, first moment and inertia, both about the base's origin.
     let mut carried = [(0.0, Vector3::zeros(), ZERO_INERTIA); MAX_JOINTS];
     for j in (0..hand.joint_count()).rev() {
@@ -60,14 +66,13 @@ pub fn mass_matrix(hand: &Hand, posture: &Posture, bodies: &[Body; MAX_JOINTS], 
             below.2 += inertia;
         }
         // Momentum of what joint j carries when it turns at unit speed, and its moment about each axis below.
-        let pose = posture.link(j);
-        let axis = pose.axis();
-        let linear = axis.cross(&(moment - pose.origin_m * mass));
-        let angular = inertia * axis - moment.cross(&axis.cross(&pose.origin_m));
+        let Body { axis, origin_m, .. } = body;
+        let linear = axis.cross(&(moment - origin_m * mass));
+        let angular = inertia * axis - moment.cross(&axis.cross(origin_m));
         let mut below = Some(j);
         while let Some(k) = below {
-            let pose = posture.link(k);
-            let entry = pose.axis().dot(&(angular - pose.origin_m.cross(&linear)));
+            let Body { axis, origin_m, .. } = &bodies[k];
+            let entry = axis.dot(&(angular - origin_m.cross(&linear)));
             h[j][k] = entry;
             h[k][j] = entry;
             below = hand.parent(k);
@@ -85,7 +90,6 @@ fn point_inertia(mass_kg: f64, at_m: &Vector3<f64>) -> Matrix3<f64> {
 /// Bias torques `(dH/2 + S_q) dq + g(q)` of Eq. 19, N m: what the joints have to supply to keep the speeds constant.
 pub fn bias_torques(
     hand: &Hand,
-    posture: &Posture,
     bodies: &[Body; MAX_JOINTS],
     speeds_rad_s: &JointVector,
     gravity_m_s2: &Vector3<f64>,
@@ -108,21 +112,20 @@ pub fn bias_torques(
     let mut forces = [Vector3::zeros(); MAX_JOINTS];
     let mut moments = [Vector3::zeros(); MAX_JOINTS];
     for k in 0..hand.joint_count() {
-        let pose = posture.link(k);
+        let body = &bodies[k];
         let parent = hand.parent(k).map_or(still, |parent| motions[parent]);
-        let lever = pose.origin_m - parent.origin;
-        let turning = pose.axis() * speeds_rad_s[k];
+        let lever = body.origin_m - parent.origin;
+        let turning = body.axis * speeds_rad_s[k];
         let motion = Motion {
             spin: parent.spin + turning,
             spin_rate: parent.spin_rate + parent.spin.cross(&turning),
-            origin: pose.origin_m,
+            origin: body.origin_m,
             acceleration: parent.acceleration
                 + parent.spin_rate.cross(&lever)
                 + parent.spin.cross(&parent.spin.cross(&lever)),
         };
         motions[k] = motion;
-        let body = &bodies[k];
-        let arm = body.centre_m - pose.origin_m;
+        let arm = body.centre_m - body.origin_m;
         let acceleration =
             motion.acceleration + motion.spin_rate.cross(&arm) + motion.spin.cross(&motion.spin.cross(&arm));
         let force = acceleration * body.mass_kg;
@@ -133,8 +136,8 @@ pub fn bias_torques(
     }
     let mut torques = [0.0; MAX_JOINTS];
     for k in (0..hand.joint_count()).rev() {
-        let pose = posture.link(k);
-        torques[k] = pose.axis().dot(&(moments[k] - pose.origin_m.cross(&forces[k])));
+        let Body { axis, origin_m, .. } = &bodies[k];
+        torques[k] = axis.dot(&(moments[k] - origin_m.cross(&forces[k])));
         if let Some(parent) = hand.parent(k) {
             forces[parent] += forces[k];
             moments[parent] += moments[k];

@@ -302,7 +302,7 @@ impl Plant {
         let model = &self.model;
         model.hand.forward_kinematics(&self.motion.angles_rad, &mut self.posture);
         place_bodies(&model.hand, &self.posture, &mut self.bodies);
-        mass_matrix(&model.hand, &self.posture, &self.bodies, &mut self.mass);
+        mass_matrix(&model.hand, &self.bodies, &mut self.mass);
         let attitude = self.motion.attitude.to_rotation_matrix().into_inner();
         self.contacts.clear();
         for ((fingertip, face), centre) in
@@ -347,7 +347,7 @@ impl Plant {
     ) {
         let speeds = &self.motion.speeds_rad_s;
         let gravity = &self.model.hand_gravity_m_s2;
-        let bias = bias_torques(&self.model.hand, &self.posture, &self.bodies, speeds, gravity);
+        let bias = bias_torques(&self.model.hand, &self.bodies, speeds, gravity);
         for (k, friction) in self.model.friction.iter().enumerate() {
             let friction = friction.torque(self.stretch_rad[k], speeds[k]);
             self.friction[k] = friction;

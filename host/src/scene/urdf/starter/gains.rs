@@ -233,7 +233,7 @@ impl Measures {
         let mut bodies = [Body::NONE; MAX_JOINTS];
         let mut mass: JointMatrix = [[0.0; MAX_JOINTS]; MAX_JOINTS];
         place_bodies(hand, &here, &mut bodies);
-        mass_matrix(hand, &here, &bodies, &mut mass);
+        mass_matrix(hand, &bodies, &mut mass);
         let mass = DMatrix::from_fn(count, count, |a, b| mass[a][b]);
         let inertias_kg_m2: Vec<f64> = mass.diagonal().iter().copied().collect();
         // Positive definite, as was checked.
