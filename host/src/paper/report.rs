@@ -39,7 +39,7 @@ pub struct Paper {
 }
 
 /// How many random polyhedra are grasped.
-const POLYHEDRA: usize = 120;
+const POLYHEDRA: usize = 100;
 
 /// How many runs there are in all, a polyhedron for one.
 pub fn runs() -> usize {
