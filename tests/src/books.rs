@@ -70,10 +70,11 @@ pub struct Page {
 /// A scene's grasp with its encoders and its output delay, tick by tick, as [`sim`](blindgrasp::sim) runs it.
 ///
 /// # Panics
-/// If the scene can't be simulated, has no encoders, or loses its grasp.
+/// If the scene can't be simulated, has no encoders or a delay of more than a tick, or loses its grasp.
 pub fn keep(scene: &Scene) -> Vec<Page> {
     let params: Params<f32, MAX_JOINTS, MAX_FINGERS> =
         Params::new(scene.hand.cast(), &scene.controller_config()).unwrap_or_else(|error| panic!("{error}"));
+    assert!(scene.actuators.output_delay_ticks <= 1, "a tick of delay at most");
     let mut state = State::new();
     let mut plant = sim::plant(scene).unwrap_or_else(|error| panic!("{error}"));
     let friction = plant.model().friction.clone();

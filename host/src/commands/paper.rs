@@ -38,6 +38,8 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
     let paper = Paper::reproduce(&|name| {
         bar.set_message(name.to_owned());
         bar.inc(1);
+        // Bisection adds runs.
+        bar.set_length(bar.position().max(bar.length().unwrap_or_default()));
     })?;
     bar.finish_and_clear();
     let text = if arguments.json { paper.json().to_string() + "\n" } else { table(&paper) };
@@ -46,7 +48,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
         files::write(directory, &paper)?;
         eprintln!("blindgrasp: wrote {}", directory.path().display());
     }
-    eprintln!("blindgrasp: {} runs in {:.0} s on {} cores", report::runs(), paper.wall_s, paper.cores);
+    eprintln!("blindgrasp: {} runs in {:.0} s on {} cores", paper.runs(), paper.wall_s, paper.cores);
     Ok(if paper.failed() { Outcome::Failed } else { Outcome::Shown })
 }
 

@@ -9,6 +9,7 @@ use super::pil::{PilError, Plan};
 use crate::plant::dynamics::JointVector;
 use crate::plant::{Lost, ModelError, Plant};
 use crate::scene::{HandModel, Scene};
+use crate::sim::delay::Delay;
 use crate::sim::encoders::Encoders;
 use crate::sim::motors::Motors;
 use crate::wire::Packet;
@@ -90,12 +91,10 @@ pub struct SimulatedHand {
     /// Before a grasp.
     plant: Plant,
     motors: Motors,
-    delayed: bool,
+    delay: Delay,
     world: World,
     /// Whether the next grasp is a new one.
     ready: bool,
-    /// Torques of the tick before, N m.
-    computed_nm: [f32; MAX_JOINTS],
     period_s: f64,
     /// When an encoder fails, ticks after each grasp.
     failure: Option<u64>,
@@ -131,10 +130,9 @@ impl SimulatedHand {
             encoders: Encoders::new(scene),
             plant: sim::plant(scene)?,
             motors: Motors::new(scene),
-            delayed: scene.actuators.output_delay_ticks > 0,
+            delay: Delay::new(scene.actuators.output_delay_ticks, [0.0; MAX_JOINTS]),
             world: World::Still,
             ready: true,
-            computed_nm: [0.0; MAX_JOINTS],
             period_s: scene.control.period_s,
             failure: None,
             model,
@@ -152,8 +150,7 @@ impl SimulatedHand {
         // There is no processor whose cycles could be counted.
         let inputs = Inputs { reading: self.read(), late, cycles: 0, dropped, packet };
         let outputs = self.device.tick(&inputs, &mut self.burst);
-        let before_nm = std::mem::replace(&mut self.computed_nm, outputs.torques_nm);
-        let wanted_nm = if self.delayed { before_nm } else { outputs.torques_nm };
+        let wanted_nm = self.delay.pass(outputs.torques_nm);
         let happened = self.move_on(outputs.record.mode, &wanted_nm);
         (outputs, happened)
     }

@@ -2,7 +2,7 @@
 
 use super::claim::{number, percent};
 use super::evidence::{Done, Evidence, EvidenceError};
-use super::sensitivity::Sweep;
+use super::sensitivity::{Sweep, outcome};
 use crate::record::sample::Sample;
 use serde::Serialize;
 
@@ -142,33 +142,6 @@ fn ends(done: &Done) -> String {
         (Some(t_s), _) => format!("{}: lost at {t_s:.1} s", done.name),
         (None, Some(t_s)) => format!("{}: at rest from {t_s:.2} s on", done.name),
         (None, None) => format!("{}: held for {:.0} s", done.name, done.summary().duration_s),
-    }
-}
-
-/// Where a sweep holds and where it fails, in words.
-pub fn outcome(sweeps: &[Sweep], name: &str) -> String {
-    let Some(sweep) = sweeps.iter().find(|sweep| sweep.name == name) else {
-        return format!("{name}: not swept");
-    };
-    let values = |held: bool| {
-        let values = sweep.points.iter().filter(|point| point.held == held).map(|point| point.value.as_str());
-        values.collect::<Vec<_>>()
-    };
-    let unit = if sweep.unit.is_empty() { String::new() } else { format!(" {}", sweep.unit) };
-    match (values(true).as_slice(), values(false).as_slice()) {
-        (_, []) => {
-            let (first, last) = (sweep.points.first(), sweep.points.last());
-            let ends =
-                first.zip(last).map_or(String::new(), |(a, b)| format!("{} to {}{unit}", a.value, b.value));
-            format!("{}: held from {ends}", sweep.what)
-        }
-        ([], _) => format!("{}: lost throughout", sweep.what),
-        (held, lost) => format!(
-            "{}: held with {}{unit}, lost with {}{unit}",
-            sweep.what,
-            held.join(", "),
-            lost.join(", ")
-        ),
     }
 }
 

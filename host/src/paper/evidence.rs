@@ -32,6 +32,14 @@ pub enum EvidenceError {
     /// An object that the search finds no grasp for.
     #[error("run `{0}`: the search finds no grasp for its object")]
     NoGrasp(String),
+    /// A sweep.
+    #[error("sweep `{sweep}`: {cause}")]
+    Sweep {
+        /// The sweep.
+        sweep: &'static str,
+        /// What is wrong with it.
+        cause: String,
+    },
     /// A name that no run has.
     #[error("no run is called `{0}`")]
     Missing(String),

@@ -239,8 +239,10 @@ pub fn gains(scene: &Scene) -> String {
         control.attitude_stiffness_nm,
         1e3 * control.period_s
     );
-    if scene.actuators.output_delay_ticks > 0 {
-        words += ", a tick late";
+    match scene.actuators.output_delay_ticks {
+        0 => {}
+        1 => words += ", a tick late",
+        ticks => words += &format!(", {ticks} ticks late"),
     }
     if control.soft_start_s > 0.0 {
         words += &format!(", force rising over {} s", control.soft_start_s);

@@ -5,12 +5,14 @@
 //! | `paper.html` | everything on one page, with nothing outside it |
 //! | `claims.json` | the same in numbers, as `--json` prints it |
 //! | `figures/*.png`, `figures/*.svg` | each figure |
+//! | `sweeps/*.csv`, `sweeps/*.png`, `sweeps/*.svg` | each sweep: a row a run, and its curve or map, as `blindgrasp sweep` writes them |
 //! | `traces/*.csv` | a row a millisecond, of the runs that the figures show |
 
 use super::page;
 use super::report::Paper;
 use crate::record::csv;
 use crate::record::run_dir::{RunDir, RunDirError};
+use crate::sweep::{Output, OutputError};
 use std::io;
 
 /// Runs whose traces are written.
@@ -22,6 +24,9 @@ pub enum FilesError {
     /// A directory or a file.
     #[error(transparent)]
     Directory(#[from] RunDirError),
+    /// A sweep.
+    #[error(transparent)]
+    Sweep(#[from] OutputError),
     /// A figure.
     #[error("cannot draw {file}: {reason}")]
     Draw {
@@ -52,6 +57,12 @@ pub fn write(directory: &RunDir, paper: &Paper) -> Result<(), FilesError> {
     let page =
         page::page(paper).map_err(|reason| FilesError::Draw { file: "paper.html".to_owned(), reason })?;
     directory.write("paper.html", |file| file.write_all(page.as_bytes()))?;
+    let sweeps = directory.below("sweeps");
+    sweeps.create()?;
+    for sweep in &paper.sweeps {
+        let path = sweeps.path().join(format!("{}.csv", sweep.varied.name));
+        Output::choose(&path)?.write(&sweep.plan, &sweep.rows)?;
+    }
     let traces = directory.below("traces");
     traces.create()?;
     for done in paper.evidence.runs.iter().filter(|done| TRACES.contains(&done.name.as_str())) {

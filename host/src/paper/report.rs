@@ -41,7 +41,7 @@ pub struct Paper {
 /// How many random polyhedra are grasped.
 const POLYHEDRA: usize = 100;
 
-/// How many runs there are in all, a polyhedron for one.
+/// How many runs are planned, a polyhedron for one; bisection adds a few.
 pub fn runs() -> usize {
     PLAN.len() + sensitivity::runs(SWEEPS) + earlier::runs() + POLYHEDRA
 }
@@ -72,6 +72,12 @@ impl Paper {
         })
     }
 
+    /// How many runs there were, a polyhedron for one.
+    pub fn runs(&self) -> usize {
+        let swept = self.sweeps.iter().map(|sweep| sweep.rows.len()).sum::<usize>();
+        self.evidence.runs.len() + swept + self.polyhedra.outcomes.len()
+    }
+
     /// Whether something came out worse than the documentation says.
     pub fn failed(&self) -> bool {
         self.surprises.iter().any(Surprise::is_worse)
@@ -86,7 +92,7 @@ impl Paper {
             "claims": self.claims,
             "surprises": self.surprises,
             "figures": self.figures.iter().map(drawn).collect::<Vec<_>>(),
-            "sweeps": self.sweeps,
+            "sweeps": self.sweeps.iter().map(Sweep::json).collect::<Vec<_>>(),
             "earlier_law": self.comparison,
             "polyhedra": self.polyhedra,
             "choices": self.choices,

@@ -2,7 +2,7 @@
 
 use super::Files;
 use super::axes::{Chart, Frame, Ruler};
-use super::drawing::{self, Drawing, TITLE_HEIGHT, WIDTH};
+use super::drawing::{self, Drawing, PANEL_HEIGHT, PANEL_WIDTH, TITLE_HEIGHT, WIDTH};
 use super::figure::{Along, Axis, Figure, Line, Panel};
 use super::palette::FAINT_INK;
 use super::pens::{LABEL_SIZE, ink, letters, pen, reason};
@@ -13,9 +13,6 @@ use std::ops::Range;
 
 const TIME_LABELS_HEIGHT: i32 = 42;
 const VALUE_LABELS_WIDTH: i32 = 74;
-/// Of a panel alone.
-const PANEL_WIDTH: i32 = 460;
-const PANEL_HEIGHT: i32 = 190;
 
 /// A panel without title and legend: for a page that has its own, and that is read on a telephone too.
 struct Alone<'a>(&'a Figure, &'a Panel);

@@ -16,6 +16,9 @@ const SVG_SCALE: i32 = 4;
 
 pub(super) const WIDTH: i32 = 960;
 pub(super) const TITLE_HEIGHT: i32 = 46;
+/// Of a panel alone, without its labels: for a page that is read on a telephone too.
+pub(super) const PANEL_WIDTH: i32 = 460;
+pub(super) const PANEL_HEIGHT: i32 = 190;
 const TITLE_SIZE: i32 = 21;
 
 /// A figure.

@@ -12,6 +12,8 @@ use nalgebra::Vector3;
 
 /// Longer runs are likely mistakes, s.
 const LONGEST_RUN_S: f64 = 3600.0;
+/// Longer delays are likely mistakes.
+const LONGEST_DELAY_TICKS: u32 = 1000;
 
 /// Checks what is known before hand and object meet.
 pub(super) fn parts(file: &SceneFile) -> Result<Parts> {
@@ -87,11 +89,11 @@ fn settings(file: &SceneFile) -> Result<usize> {
     self::control(control)?;
     within("duration_s", file.duration_s, control.period_s, LONGEST_RUN_S)?;
     within("sensors.noise_counts", file.sensors.noise_counts, 0.0, 1e6)?;
-    if file.actuators.output_delay_ticks > 1 {
+    if file.actuators.output_delay_ticks > LONGEST_DELAY_TICKS {
         return fail(
             "actuators.output_delay_ticks",
-            format!("{} is not modelled", file.actuators.output_delay_ticks),
-            "has to be 0 or 1",
+            format!("{} is out of range", file.actuators.output_delay_ticks),
+            format!("has to be a whole number from 0 to {LONGEST_DELAY_TICKS}"),
         );
     }
     if let Some(slew) = file.actuators.slew_limit_nm_s {

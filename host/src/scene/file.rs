@@ -210,7 +210,8 @@ pub struct Sensors {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Actuators {
-    /// Control periods between reading the encoders and applying the torques: 0 or 1.
+    /// Control periods between reading the encoders and applying the torques, 0 to 1000. A hand whose controller reads first and
+    /// writes last has 1.
     #[serde(default = "Actuators::output_delay_ticks")]
     pub output_delay_ticks: u32,
     /// Whether the torque limits of the hand's joints apply.

@@ -5,7 +5,7 @@
 //! 1. **Sense**: the encoders count the joint angles of this instant (with noise, if asked for).
 //! 2. **Control**: the tick takes the counts to torques.
 //! 3. **Actuate**: the amplifiers hold, for one period, the torques of the tick before (the one-cycle output delay of a
-//!    controller that reads first and writes last), within what the motors can do.
+//!    controller that reads first and writes last; or as many ticks before as the scene says), within what the motors can do.
 //! 4. **Plant**: sub-steps up to the next period. Friction of the joints is the plant's.
 //! 5. **Record**: the state at the beginning of the period.
 //!
@@ -13,6 +13,7 @@
 //! estimator. Everything is deterministic: the same scene and seed give the same bytes.
 
 pub mod controller;
+pub(crate) mod delay;
 pub(crate) mod encoders;
 pub mod injection;
 pub(crate) mod motors;
@@ -32,6 +33,7 @@ use blindgrasp_shared::fault::Raised;
 use blindgrasp_shared::parameter::ParameterError;
 use blindgrasp_shared::tick::Sensed;
 use controller::{Alone, Controller, Reach, Stepped, Turn};
+use delay::Delay;
 use encoders::Encoders;
 use injection::{Injection, Injections, Sensing};
 use motors::Motors;
@@ -85,7 +87,7 @@ pub struct Simulation<C = Alone> {
     /// Ticks from one sample to the next.
     sample_ticks: u64,
     motors: Motors,
-    delayed: bool,
+    delay_ticks: u32,
     /// The force `f_d` when all of it acts, N.
     force_n: f32,
     ideal: bool,
@@ -139,7 +141,7 @@ impl<C: Controller> Simulation<C> {
             period_us: (scene.control.period_s * 1e6).round() as u64,
             sample_ticks: 1,
             motors: Motors::new(scene),
-            delayed: scene.actuators.output_delay_ticks > 0,
+            delay_ticks: scene.actuators.output_delay_ticks,
             force_n: scene.controller_config().law.force_n,
             ideal: scene.sensors.ideal,
             encoders: Encoders::new(scene),
@@ -203,6 +205,7 @@ impl<C: Controller> Simulation<C> {
         // The hand is armed while everything stands still.
         let mut stepped = self.control(None, Some(Command::Arm))?;
         watch(&self.controller);
+        let mut delay = Delay::new(self.delay_ticks, stepped.torques_nm);
         let begun = Instant::now();
         let mut tally = Tally::default();
         let mut first_fault = None;
@@ -215,11 +218,10 @@ impl<C: Controller> Simulation<C> {
                 break;
             }
             // 1, 2: sense and control. The first tick is told to grasp.
-            let computed_before = stepped.torques_nm;
             stepped = self.control(Some(tick), (tick == 0).then_some(Command::Grasp(Grasp::CONFIGURED)))?;
             watch(&self.controller);
             first_fault = first_fault.or(stepped.fault.map(|raised| (tick, raised)));
-            let wanted_nm = if self.delayed { computed_before } else { stepped.torques_nm };
+            let wanted_nm = delay.pass(stepped.torques_nm);
             let record = |sample: Sample| {
                 tally.see(&sample);
                 keep(sample);

@@ -19,6 +19,17 @@ pub struct Edge {
     pub lost: f64,
 }
 
+/// Neighbouring values at all of which the same becomes of the grasp.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Stretch {
+    /// The smallest of them.
+    pub from: f64,
+    /// The largest.
+    pub to: f64,
+    /// Whether the grasp is held, with every seed.
+    pub held: bool,
+}
+
 /// A sweep that came to its end, or to the one that somebody wanted.
 #[derive(Clone, Debug)]
 pub struct Swept {
@@ -31,13 +42,19 @@ pub struct Swept {
 /// Where the grasp begins to fail, in the order of the values; nothing if several keys are varied, or words. Values that the
 /// scene refuses count as if they were not there.
 pub fn edges(plan: &Plan, rows: &[Row]) -> Vec<Edge> {
+    let stretches = stretches(plan, rows);
+    let edge = |pair: &[Stretch]| {
+        let (below, above) = (pair[0].to, pair[1].from);
+        if pair[0].held { Edge { held: below, lost: above } } else { Edge { held: above, lost: below } }
+    };
+    stretches.windows(2).map(edge).collect()
+}
+
+/// Where the grasp is held and where it is lost, in the order of the values; between them are the [`edges`].
+pub fn stretches(plan: &Plan, rows: &[Row]) -> Vec<Stretch> {
     let verdicts = verdicts(plan, rows);
-    let turns = verdicts.windows(2).filter(|pair| pair[0].1 != pair[1].1);
-    turns
-        .map(|pair| match (pair[0], pair[1]) {
-            ((held, true), (lost, _)) | ((lost, _), (held, _)) => Edge { held, lost },
-        })
-        .collect()
+    let same = verdicts.chunk_by(|(_, held), (_, next)| held == next);
+    same.map(|same| Stretch { from: same[0].0, to: same[same.len() - 1].0, held: same[0].1 }).collect()
 }
 
 /// Runs a plan on all cores, all but the rows that are `known`; then, if `refine` is given, adds values to it where the grasp

@@ -35,11 +35,11 @@ mod tests;
 mod unit;
 
 pub use axis::{Axis, AxisError, Scale, Value};
-pub use edge::{Edge, Swept, edges, run_refined};
+pub use edge::{Edge, Stretch, Swept, edges, run_refined, stretches};
 pub use identity::Identity;
 pub use journal::{Found, Journal, JournalError};
 pub use output::{Output, OutputError};
 pub use overview::{Overview, Varied};
-pub use picture::draw;
+pub use picture::{Picture, draw, picture};
 pub use plan::{Plan, PlanError};
 pub use run::{Outcome, Row, run, run_some};

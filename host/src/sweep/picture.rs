@@ -14,13 +14,30 @@ pub(super) fn is_drawn(plan: &Plan) -> bool {
     (1..=2).contains(&plan.axes().len())
 }
 
-/// The picture of a sweep, as a PNG file and as an SVG file: over one key a curve, over two a map; none over more.
-pub fn draw(plan: &Plan, rows: &[Row]) -> Option<Files> {
+/// The picture of a sweep.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Picture {
+    /// Over one key.
+    Curve(Curve),
+    /// Over two.
+    Map(Map),
+}
+
+/// The picture of a sweep: over one key a curve, over two a map; none over more.
+pub fn picture(plan: &Plan, rows: &[Row]) -> Option<Picture> {
     match plan.axes() {
-        [x] => Some(curve(plan, rows, x).files()),
-        [x, y] => Some(map(plan, rows, x, y).files()),
+        [x] => Some(Picture::Curve(curve(plan, rows, x))),
+        [x, y] => Some(Picture::Map(map(plan, rows, x, y))),
         _ => None,
     }
+}
+
+/// The [`picture`] of a sweep, as a PNG file and as an SVG file.
+pub fn draw(plan: &Plan, rows: &[Row]) -> Option<Files> {
+    picture(plan, rows).map(|picture| match picture {
+        Picture::Curve(curve) => curve.files(),
+        Picture::Map(map) => map.files(),
+    })
 }
 
 fn curve(plan: &Plan, rows: &[Row], x: &Axis) -> Curve {
@@ -89,11 +106,13 @@ fn spread(axis: &Axis) -> Spread {
 /// A curve needs no even steps: in it, listed numbers lie where they belong.
 fn curve_spread(axis: &Axis) -> Spread {
     let numbers = numbers(axis);
-    let (low, high) =
-        numbers.iter().fold((f64::INFINITY, 0.0), |(low, high): (f64, f64), v| (low.min(*v), high.max(*v)));
+    let positive = || numbers.iter().copied().filter(|number| *number > 0.0);
+    let is_wide = positive().fold(0.0, f64::max) > MOST_LINEAR * positive().fold(f64::INFINITY, f64::min);
     match axis.scale {
         Scale::Listed if !axis.is_numeric() => Spread::Listed,
-        Scale::Listed if low > 0.0 && high > MOST_LINEAR * low => Spread::Logarithmic(numbers),
+        Scale::Listed if is_wide && numbers.iter().all(|number| *number >= 0.0) => {
+            Spread::Logarithmic(numbers)
+        }
         Scale::Listed => Spread::Linear(numbers),
         _ => spread(axis),
     }

@@ -6,8 +6,9 @@ use crate::paper::earlier::{Carried, Final, Object};
 use crate::paper::evidence::scene as load;
 use crate::paper::laws::{Case, GAINS, Grasped, Law, Lost};
 use crate::paper::polyhedra::{Outcome, Polyhedra};
-use crate::paper::sensitivity::Point;
+use crate::paper::sensitivity::Varied;
 use crate::sim::Simulation;
+use crate::sweep::{self, run};
 use nalgebra::Vector3;
 
 use Verdict::{Differs, NotReproduced, Reproduced};
@@ -181,32 +182,40 @@ fn normal_forces_alone() {
     prism.run.summary.settled = true;
     assert_eq!(normal_only::normal_only_row(&prism).verdict, Reproduced);
 
-    let point = |number: f64, held| Point {
-        value: number.to_string(),
-        number: Some(number),
-        held,
-        lost_at_s: None,
-        lost_reason: None,
-        settle_time_s: None,
-        joint_speed_max_rad_s: 0.0,
-        normal_error: 0.0,
+    // Three runs whose verdicts are what they should be.
+    let sweep = |name: &'static str, held: [bool; 3]| {
+        let axes = &["control.attitude_stiffness_nm=0,5e-3,0.1"];
+        let varied = Varied {
+            name,
+            what: "",
+            scene: "cube-ideal",
+            settings: &["duration_s=0.01"],
+            axes,
+            usual: Some(5e-3),
+        };
+        let plan = varied.plan().expect("a plan");
+        let mut rows = run(&plan);
+        for (row, held) in rows.iter_mut().zip(held) {
+            if let sweep::Outcome::Ran(summary) = &mut row.outcome {
+                summary.grasp_held = held;
+            }
+        }
+        Sweep { varied, plan, rows }
     };
-    let sweep = |name: &str, held: [bool; 3]| Sweep {
-        name: name.to_owned(),
-        what: String::new(),
-        key: "control.attitude_stiffness_nm".to_owned(),
-        unit: String::new(),
-        scene: String::new(),
-        settings: Vec::new(),
-        usual: String::new(),
-        has_friction: false,
-        points: [0.0, 5e-3, 0.1].into_iter().zip(held).map(|(k, held)| point(k, held)).collect(),
+    let verdicts = |slow, fast| {
+        let claim = normal_only::region(&[sweep("stiffness", slow), sweep("stiffness-continuous", fast)]);
+        [claim.rows[0].verdict, claim.rows[1].verdict]
     };
-    let verdict = |name: &str, held| normal_only::region(&[sweep(name, held)]).rows[0].verdict;
-    assert_eq!(verdict("stiffness-continuous", [false, true, true]), Reproduced);
-    assert_eq!(verdict("stiffness-continuous", [true, true, true]), NotReproduced);
-    assert_eq!(verdict("stiffness-continuous", [false, false, true]), NotReproduced);
-    assert_eq!(verdict("stiffness", [false, true, false]), Differs, "sampling explains it");
+    let (held, lost_above) = ([false, true, true], [false, true, false]);
+    assert_eq!(verdicts(held, held), [Reproduced; 2]);
+    assert_eq!(verdicts(lost_above, held), [Differs, Reproduced], "sampling explains it");
+    assert_eq!(verdicts(lost_above, lost_above), [NotReproduced; 2], "a faster law makes no difference");
+    assert_eq!(verdicts(held, [true, true, true]), [Reproduced, NotReproduced], "held without u_st");
+    assert_eq!(
+        verdicts(held, [false, false, true]),
+        [Reproduced, NotReproduced],
+        "lost at that of Table VII"
+    );
 }
 
 #[test]

@@ -21,7 +21,7 @@ pub(super) fn tally(paper: &Paper) -> Markup {
         @if paper.surprises.is_empty() {
             p { "Every verdict is the one that the documentation states." }
         } @else {
-            p { strong { (paper.surprises.len()) " verdicts are not those that the documentation states" } "; they are marked below." }
+            p { strong { "Verdicts that are not those that the documentation states: " (paper.surprises.len()) } ", marked below." }
         }
     }
 }
@@ -30,7 +30,7 @@ pub(super) fn tally(paper: &Paper) -> Markup {
 fn overview(claims: &[Claim]) -> Markup {
     html! {
         table.stack {
-            caption { "At a glance: in how many runs each claim was reproduced, and in which it was not" }
+            caption { "In how many runs each claim was reproduced, and in which it was not" }
             thead {
                 tr {
                     th scope="col" { "Claim" } th scope="col" { "Place" } th scope="col" { "Reproduced" }
@@ -100,7 +100,7 @@ fn line(claim: &Claim, row: &Row) -> Markup {
 }
 
 /// A sign, so that nothing hangs on colour.
-fn sign(verdict: Verdict) -> &'static str {
+pub(super) fn sign(verdict: Verdict) -> &'static str {
     match verdict {
         Verdict::Reproduced => "\u{2713}",
         Verdict::Differs => "\u{2248}",
@@ -108,7 +108,7 @@ fn sign(verdict: Verdict) -> &'static str {
     }
 }
 
-fn class(verdict: Verdict) -> &'static str {
+pub(super) fn class(verdict: Verdict) -> &'static str {
     match verdict {
         Verdict::Reproduced => "reproduced",
         Verdict::Differs => "differs",

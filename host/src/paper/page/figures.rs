@@ -57,7 +57,7 @@ fn panels(chart: &Figure) -> Result<Markup, String> {
 }
 
 /// The element with what it shows in words.
-fn described(svg: &str, words: &str) -> String {
+pub(super) fn described(svg: &str, words: &str) -> String {
     let label = html! { svg role="img" aria-label=(words) {} }.into_string();
     svg.replacen("<svg ", &label.replace("></svg>", " "), 1)
 }
@@ -94,6 +94,16 @@ fn key(line: &Line) -> Markup {
             line x1="0" y1="5" x2="32" y2="5" stroke=(format!("#{r:02X}{g:02X}{b:02X}")) stroke-width="2.4" stroke-dasharray=(dash) {}
         }
     }
+}
+
+/// The last picture of a strip, without a caption.
+pub(super) fn last_picture(drawn: &Drawn, words: &str) -> Result<Option<Markup>, String> {
+    let Drawing::Strip(strip) = &drawn.drawing else { return Ok(None) };
+    let Some(png) = strip.times_s.len().checked_sub(1).and_then(|last| strip.picture_png(last)) else {
+        return Ok(None);
+    };
+    let source = format!("data:image/png;base64,{}", STANDARD.encode(png?));
+    Ok(Some(html! { img.hero src=(source) width="480" height="400" alt=(words); }))
 }
 
 fn pictures(title: &str, strip: &Strip) -> Result<Markup, String> {

@@ -7,6 +7,7 @@
 mod claims;
 mod earlier;
 mod figures;
+mod summary;
 mod sweeps;
 mod tables;
 
@@ -21,6 +22,10 @@ const STYLE: &str = include_str!("style.css");
 /// A figure that can't be drawn.
 pub(super) fn page(paper: &Paper) -> Result<String, String> {
     let figures = figures::section(&paper.figures)?;
+    let sweeps = sweeps::section(&paper.sweeps)?;
+    let cube = paper.figures.iter().find(|drawn| drawn.file == "fig-13-cube-pictures");
+    let words = "The hand of the experiments holds the cube";
+    let picture = cube.map(|drawn| figures::last_picture(drawn, words)).transpose()?.flatten();
     let page = html! {
         (DOCTYPE)
         html lang="en" {
@@ -39,6 +44,10 @@ pub(super) fn page(paper: &Paper) -> Result<String, String> {
                         ": its simulation and its experiments, simulated with the controller of blindgrasp; the counterparts of its \
                          figures; and each of its claims with what was measured."
                     }
+                    div.opening {
+                        (summary::summary(paper))
+                        @if let Some(picture) = &picture { (picture) }
+                    }
                     (claims::tally(paper))
                     nav aria-label="Sections" {
                         ul {
@@ -50,7 +59,7 @@ pub(super) fn page(paper: &Paper) -> Result<String, String> {
                     (claims::section(paper))
                     (figures)
                     (earlier::section(&paper.comparison, &paper.polyhedra))
-                    (sweeps::section(&paper.sweeps))
+                    (sweeps)
                     (tables::choices(&paper.choices))
                     (tables::tables(&paper.evidence))
                     (tables::runs(&paper.evidence))
@@ -58,7 +67,7 @@ pub(super) fn page(paper: &Paper) -> Result<String, String> {
                 footer {
                     p.small {
                         "Written by " code { "blindgrasp paper" } " " (env!("CARGO_PKG_VERSION")) ": "
-                        (paper.evidence.runs.len()) " runs and " (paper.sweeps.iter().map(|sweep| sweep.points.len()).sum::<usize>())
+                        (paper.evidence.runs.len()) " runs and " (paper.sweeps.iter().map(|sweep| sweep.rows.len()).sum::<usize>())
                         " runs of sweeps in " (format!("{:.0}", paper.wall_s)) " s on " (paper.cores) " cores. All numbers on this page \
                          are of this run."
                     }
@@ -84,7 +93,7 @@ fn section(id: &str, content: Markup) -> Markup {
     let title = SECTIONS.iter().find(|(of, _)| *of == id).map_or("", |(_, title)| title);
     html! {
         section aria-labelledby=(id) {
-            h2 id=(id) { (title) }
+            h2.major[id != "claims"] id=(id) { (title) }
             (content)
         }
     }

@@ -1,7 +1,7 @@
 //! What came of the runs over one variable: when they came to rest or were lost, and the friction that they asked for.
 
 use super::super::axes::{Chart, Frame, Ruler};
-use super::super::drawing::{self, Drawing, TITLE_HEIGHT, WIDTH};
+use super::super::drawing::{self, Drawing, PANEL_HEIGHT as ALONE_HEIGHT, PANEL_WIDTH, TITLE_HEIGHT, WIDTH};
 use super::super::palette::{BLUE, FAINT_INK, Rgb, VERMILLION, WHITE, mix};
 use super::super::pens::{ink, pen, reason};
 use super::super::series;
@@ -62,6 +62,14 @@ impl Curve {
     /// Draws it.
     pub fn files(&self) -> Files {
         [self.png(), self.svg()]
+    }
+
+    /// The times alone as an SVG file, without title and key.
+    ///
+    /// # Errors
+    /// What the drawing library says.
+    pub fn panel_svg(&self) -> Result<Vec<u8>, String> {
+        Alone(self).svg()
     }
 
     /// Times: at rest, still moving, or lost.
@@ -136,45 +144,32 @@ impl Drawing for Curve {
 
     fn draw<B: DrawingBackend>(&self, root: &DrawingArea<B, Shift>, scale: i32) -> Result<(), String> {
         let places = self.x.places();
-        let (low, high) = series::extremes(places.iter().copied()).unwrap_or((0.0, 0.0));
-        let air = match &self.x.spread {
-            Spread::Listed => 0.5,
-            _ if high > low => 0.03 * (high - low),
-            _ => 0.5,
-        };
-        let x = self.x.ruler(air, Along::Horizontal, WIDTH - key::WIDTH - LEFT - RIGHT);
+        let x = self.ruler(&places, WIDTH - key::WIDTH);
         drawing::begin(root, &self.title, LEFT, scale)?;
-        let lost = self.lost(&places, &x);
-        let mut top = TITLE_HEIGHT;
-        for (k, panel) in [self.times(&places), self.friction(&places)].iter().enumerate() {
-            let labels = if k == 1 { LABELS_HEIGHT - 2 } else { 0 };
-            let height = PANEL_HEIGHT + labels;
-            let (_, below) = root.split_vertically(top * scale);
-            let (area, _) = below.split_vertically(height * scale);
-            let (area, side) = area.split_horizontally((WIDTH - key::WIDTH) * scale);
-            let frame =
-                Frame { left: LEFT, right: RIGHT, top: 7, bottom: if k == 1 { 2 } else { 7 }, labels };
-            let mut chart = frame.draw_over(&area, (&x, &panel.y), scale, |chart| {
-                let Ruler { range, .. } = &panel.y;
-                let bands = lost.iter().map(|(from, to)| {
-                    let corners = [(*from, range.start), (*to, range.end)];
-                    Rectangle::new(corners, ink(pale(), 0).filled())
-                });
-                chart.draw_series(bands).map(|_| ()).map_err(reason)
-            })?;
-            if self.x.spread != Spread::Listed {
-                let line = LineSeries::new(panel.line.clone(), pen(mix(BLUE, WHITE, 0.6), scale));
-                chart.draw_series(line).map_err(reason)?;
-            }
-            for (at, sign) in &panel.signs {
-                sign.draw(&mut chart, *at, scale)?;
-            }
-            if k == 0 {
-                self.refused(&mut chart, &places, panel.y.range.start, scale)?;
-                self.explain(&side, scale)?;
-            }
-            top += height;
-        }
+        let (_, below) = root.split_vertically(TITLE_HEIGHT * scale);
+        let (times, friction) = below.split_vertically(PANEL_HEIGHT * scale);
+        let (times, side) = times.split_horizontally((WIDTH - key::WIDTH) * scale);
+        let (friction, _) = friction.split_horizontally((WIDTH - key::WIDTH) * scale);
+        self.draw_times(&times, &places, &x, 0, scale)?;
+        self.explain(&side, scale)?;
+        self.draw_panel(&self.friction(&places), &friction, (&places, &x), LABELS_HEIGHT - 2, scale)?;
+        root.present().map_err(reason)
+    }
+}
+
+/// The panel of times without title and key: for a page that has its own, and that is read on a telephone too.
+struct Alone<'a>(&'a Curve);
+
+impl Drawing for Alone<'_> {
+    fn size(&self) -> (i32, i32) {
+        (PANEL_WIDTH, ALONE_HEIGHT + LABELS_HEIGHT)
+    }
+
+    fn draw<B: DrawingBackend>(&self, root: &DrawingArea<B, Shift>, scale: i32) -> Result<(), String> {
+        let Self(curve) = self;
+        let places = curve.x.places();
+        drawing::paper(root)?;
+        curve.draw_times(root, &places, &curve.ruler(&places, PANEL_WIDTH), LABELS_HEIGHT - 2, scale)?;
         root.present().map_err(reason)
     }
 }
@@ -185,6 +180,58 @@ fn pale() -> Rgb {
 }
 
 impl Curve {
+    /// The horizontal axis of a panel of some width, pixels.
+    fn ruler(&self, places: &[f64], width: i32) -> Ruler {
+        let (low, high) = series::extremes(places.iter().copied()).unwrap_or((0.0, 0.0));
+        let air = match &self.x.spread {
+            Spread::Listed => 0.5,
+            _ if high > low => 0.03 * (high - low),
+            _ => 0.5,
+        };
+        self.x.ruler(air, Along::Horizontal, width - LEFT - RIGHT)
+    }
+
+    fn draw_times<B: DrawingBackend>(
+        &self,
+        area: &DrawingArea<B, Shift>,
+        places: &[f64],
+        x: &Ruler,
+        labels: i32,
+        scale: i32,
+    ) -> Result<(), String> {
+        let panel = self.times(places);
+        let mut chart = self.draw_panel(&panel, area, (places, x), labels, scale)?;
+        self.refused(&mut chart, places, panel.y.range.start, scale)
+    }
+
+    /// Draws a panel, with so many pixels for the labels of its horizontal axis; none if it has none.
+    fn draw_panel<'a, B: DrawingBackend>(
+        &self,
+        panel: &Panel,
+        area: &DrawingArea<B, Shift>,
+        (places, x): (&[f64], &Ruler),
+        labels: i32,
+        scale: i32,
+    ) -> Result<Chart<'a, B>, String> {
+        let bottom = if labels > 0 { 2 } else { 7 };
+        let frame = Frame { left: LEFT, right: RIGHT, top: 7, bottom, labels };
+        let mut chart = frame.draw_over(area, (x, &panel.y), scale, |chart| {
+            let Ruler { range, .. } = &panel.y;
+            let bands = self.lost(places, x).into_iter().map(|(from, to)| {
+                Rectangle::new([(from, range.start), (to, range.end)], ink(pale(), 0).filled())
+            });
+            chart.draw_series(bands).map(|_| ()).map_err(reason)
+        })?;
+        if self.x.spread != Spread::Listed {
+            let line = LineSeries::new(panel.line.clone(), pen(mix(BLUE, WHITE, 0.6), scale));
+            chart.draw_series(line).map_err(reason)?;
+        }
+        for (at, sign) in &panel.signs {
+            sign.draw(&mut chart, *at, scale)?;
+        }
+        Ok(chart)
+    }
+
     /// A stroke on the axis at each value that was refused.
     fn refused<B: DrawingBackend>(
         &self,

@@ -1,7 +1,7 @@
 //! What came of the runs over two variables: a map of coloured fields.
 
-use super::super::axes::{Chart, Frame};
-use super::super::drawing::{self, Drawing, TITLE_HEIGHT, WIDTH};
+use super::super::axes::{Chart, Frame, Ruler};
+use super::super::drawing::{self, Drawing, PANEL_WIDTH, TITLE_HEIGHT, WIDTH};
 use super::super::palette::{FAINT_INK, INK, Rgb};
 use super::super::pens::{ink, reason};
 use super::Mark;
@@ -43,6 +43,14 @@ impl Map {
         [self.png(), self.svg()]
     }
 
+    /// The fields alone, and the key, as SVG files.
+    ///
+    /// # Errors
+    /// What the drawing library says.
+    pub fn panel_svgs(&self) -> Result<[Vec<u8>; 2], String> {
+        Ok([Fields(self).svg()?, Explained(self).svg()?])
+    }
+
     fn all(&self) -> impl Iterator<Item = Mark> {
         self.marks.iter().flatten().filter_map(|mark| *mark)
     }
@@ -53,6 +61,12 @@ impl Map {
 
     /// Of the chart: so many pixels that its key has place beside it.
     fn height(&self) -> i32 {
+        let key = self.key_height() - LABELS_HEIGHT;
+        (FIELD_HEIGHT * self.marks.len() as i32).clamp(LEAST_HEIGHT.max(key), MOST_HEIGHT)
+    }
+
+    /// Pixels.
+    fn key_height(&self) -> i32 {
         let count = |kinds: [bool; 2]| kinds.into_iter().filter(|is_there| *is_there).count();
         let ramps = [
             self.has(|mark| matches!(mark, Mark::Rested(_))),
@@ -60,8 +74,7 @@ impl Map {
         ];
         let samples =
             [self.has(|mark| matches!(mark, Mark::Moving(_))), self.has(|mark| *mark == Mark::Refused)];
-        let key = key::height(count(ramps), count(samples)) - LABELS_HEIGHT;
-        (FIELD_HEIGHT * self.marks.len() as i32).clamp(LEAST_HEIGHT.max(key), MOST_HEIGHT)
+        key::height(count(ramps), count(samples))
     }
 }
 
@@ -79,15 +92,65 @@ impl Drawing for Map {
     }
 
     fn draw<B: DrawingBackend>(&self, root: &DrawingArea<B, Shift>, scale: i32) -> Result<(), String> {
-        let (x, y) = (self.x.places(), self.y.places());
-        let vertical = self.y.ruler(half(&y), Along::Vertical, self.height());
-        let left = 46 + (widest(&vertical) as i32).clamp(24, 140);
-        let frame = Frame { left, right: 10, top: 4, bottom: 4, labels: LABELS_HEIGHT };
-        let horizontal = self.x.ruler(half(&x), Along::Horizontal, WIDTH - key::WIDTH - left - frame.right);
-        drawing::begin(root, &self.title, left, scale)?;
+        let vertical = self.vertical(self.height());
+        drawing::begin(root, &self.title, left(&vertical), scale)?;
         let (_, below) = root.split_vertically(TITLE_HEIGHT * scale);
         let (area, side) = below.split_horizontally((WIDTH - key::WIDTH) * scale);
-        let mut chart = frame.draw(&area, (&horizontal, &vertical), scale)?;
+        self.draw_fields(&area, &vertical, WIDTH - key::WIDTH, scale)?;
+        Colours::new(self).explain(&side, self, scale)?;
+        root.present().map_err(reason)
+    }
+}
+
+/// The fields without title and key, and the key: for a page that is read on a telephone too.
+struct Fields<'a>(&'a Map);
+struct Explained<'a>(&'a Map);
+
+impl Drawing for Fields<'_> {
+    fn size(&self) -> (i32, i32) {
+        (PANEL_WIDTH, LEAST_HEIGHT + LABELS_HEIGHT + 12)
+    }
+
+    fn draw<B: DrawingBackend>(&self, root: &DrawingArea<B, Shift>, scale: i32) -> Result<(), String> {
+        drawing::paper(root)?;
+        self.0.draw_fields(root, &self.0.vertical(LEAST_HEIGHT), PANEL_WIDTH, scale)?;
+        root.present().map_err(reason)
+    }
+}
+
+impl Drawing for Explained<'_> {
+    fn size(&self) -> (i32, i32) {
+        (key::WIDTH, self.0.key_height())
+    }
+
+    fn draw<B: DrawingBackend>(&self, root: &DrawingArea<B, Shift>, scale: i32) -> Result<(), String> {
+        drawing::paper(root)?;
+        Colours::new(self.0).explain(root, self.0, scale)?;
+        root.present().map_err(reason)
+    }
+}
+
+/// Pixels to the left of the chart, for the labels of its vertical axis.
+fn left(vertical: &Ruler) -> i32 {
+    46 + (widest(vertical) as i32).clamp(24, 140)
+}
+
+impl Map {
+    fn vertical(&self, pixels: i32) -> Ruler {
+        self.y.ruler(half(&self.y.places()), Along::Vertical, pixels)
+    }
+
+    fn draw_fields<B: DrawingBackend>(
+        &self,
+        area: &DrawingArea<B, Shift>,
+        vertical: &Ruler,
+        width: i32,
+        scale: i32,
+    ) -> Result<(), String> {
+        let (x, y) = (self.x.places(), self.y.places());
+        let frame = Frame { left: left(vertical), right: 10, top: 4, bottom: 4, labels: LABELS_HEIGHT };
+        let horizontal = self.x.ruler(half(&x), Along::Horizontal, width - frame.left - frame.right);
+        let mut chart = frame.draw(area, (&horizontal, vertical), scale)?;
         let colours = Colours::new(self);
         for (row, at) in self.marks.iter().zip(&y) {
             for (mark, across) in row.iter().zip(&x) {
@@ -97,13 +160,9 @@ impl Drawing for Map {
                 }
             }
         }
-        self.border(&mut chart, (&x, &y), scale)?;
-        colours.explain(&side, self, scale)?;
-        root.present().map_err(reason)
+        self.border(&mut chart, (&x, &y), scale)
     }
-}
 
-impl Map {
     /// A line between fields where the grasp is held and fields where it is lost.
     fn border<B: DrawingBackend>(
         &self,

@@ -233,6 +233,16 @@ fn curves_of_any_size_are_drawn_without_words_over_words() {
         let bisected = (0..count).map(|k| 1.0 + 0.5_f64.powi(k as i32)).collect();
         svg(curve(variable("control.force_n", "N", Spread::Linear(bisected), count), marks).files());
     }
+    // Zero beside decades: left of all others, with its own label.
+    for count in [3, 40] {
+        let mut numbers = vec![0.0];
+        numbers.extend((0..count - 1).map(|k| 10_f64.powf(-3.0 + 6.0 * f64::from(k) / f64::from(count - 2))));
+        let zero = variable("friction.scale", "", Spread::Logarithmic(numbers), count as usize);
+        let places = zero.places();
+        assert!(places[1..].windows(2).all(|pair| pair[0] < pair[1]) && places[0] < places[1]);
+        let svg = svg(curve(zero, &"x.o".repeat(count as usize).get(..count as usize).unwrap()).files());
+        assert!(says(&svg, "0"), "{count}");
+    }
     // Friction over decades.
     let mut wide = curve(linear(6), "......");
     for (k, dot) in wide.dots.iter_mut().enumerate() {

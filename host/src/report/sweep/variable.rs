@@ -9,6 +9,8 @@ use std::ops::Range;
 const GAP: f64 = 10.0;
 /// Pixels that a line of text takes.
 const LINE: f64 = 17.0;
+/// How far zero lies from the smallest number above it on a logarithmic axis: this share of the decades, and at least so many.
+const ZERO: (f64, f64) = (0.12, 0.3);
 /// Letters of a word along an axis.
 const LONGEST_WORD: usize = 16;
 
@@ -30,7 +32,7 @@ pub struct Variable {
 pub enum Spread {
     /// By their size.
     Linear(Vec<f64>),
-    /// By their logarithms; all are above zero.
+    /// By their logarithms; none is below zero. Zero itself lies a little below the others.
     Logarithmic(Vec<f64>),
     /// One after the other.
     Listed,
@@ -48,7 +50,11 @@ impl Variable {
     pub(super) fn places(&self) -> Vec<f64> {
         match &self.spread {
             Spread::Linear(numbers) => numbers.clone(),
-            Spread::Logarithmic(numbers) => numbers.iter().map(|number| number.log10()).collect(),
+            Spread::Logarithmic(numbers) => {
+                let zero = zero(numbers);
+                let place = |number: &f64| if *number > 0.0 { number.log10() } else { zero };
+                numbers.iter().map(place).collect()
+            }
             Spread::Listed => (0..self.values.len()).map(|k| k as f64).collect(),
         }
     }
@@ -67,7 +73,11 @@ impl Variable {
                     let round = series::ticks(&range, 8);
                     round.iter().map(|&tick| (tick, series::label(tick, &round))).collect()
                 }
-                Spread::Logarithmic(_) => round_powers(&range),
+                Spread::Logarithmic(numbers) => {
+                    let positive = decades(numbers).map_or(range.clone(), |(low, _)| low..range.end);
+                    let zero = numbers.contains(&0.0).then(|| (zero(numbers), "0".to_owned()));
+                    zero.into_iter().chain(round_powers(&positive)).collect()
+                }
                 Spread::Listed => some(ticks, per_unit, along),
             };
         }
@@ -87,6 +97,17 @@ impl Variable {
             Spread::Listed => self.values.iter().map(|value| text::shortened(value, LONGEST_WORD)).collect(),
         }
     }
+}
+
+/// Least and largest logarithm of the numbers above zero.
+fn decades(numbers: &[f64]) -> Option<(f64, f64)> {
+    series::extremes(numbers.iter().filter(|number| **number > 0.0).map(|number| number.log10()))
+}
+
+/// Where zero lies on a logarithmic axis.
+fn zero(numbers: &[f64]) -> f64 {
+    let (low, high) = decades(numbers).unwrap_or_default();
+    low - (ZERO.0 * (high - low)).max(ZERO.1)
 }
 
 /// Pixels that the longest label of an axis takes.

@@ -119,6 +119,11 @@ fn errors_say_where_what_and_what_to_do() {
             "output_delay_ticks = -1",
             "s.toml:40: actuators.output_delay_ticks: is integer `-1`; has to be a whole number, not negative",
         ),
+        (
+            "output_delay_ticks = 1",
+            "output_delay_ticks = 1001",
+            "s.toml:40: actuators.output_delay_ticks: 1001 is out of range; has to be a whole number from 0 to 1000",
+        ),
         ("ideal = false", "ideal = 0", "s.toml:36: sensors.ideal: is integer `0`; has to be true or false"),
         ("[friction]", "[frction]", "s.toml:43: frction: unknown key; did you mean `friction`?"),
         (
