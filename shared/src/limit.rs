@@ -369,11 +369,17 @@ mod tests {
     use super::*;
     use std::string::ToString;
 
-    /// Range -1 to 1 rad, margin 0.1 rad.
+    /// Range -1 to 1 rad, margin 0.1 rad; ticks of a millisecond.
     fn joint(torque_nm: Option<f64>, slew_nm: Option<f64>, stops: bool) -> JointLimits<f64> {
-        let stop = StopConfig { margin_rad: [0.1], stiffness_nm_rad: [2.0], damping_nm_s: [0.5] };
-        let stop = stops.then(|| stop.prepare(0, (-1.0, 1.0)).unwrap());
-        JointLimits { torque_nm, slew_nm, stop }
+        let stop = StopConfigOf { margin_rad: 0.1, stiffness_nm_rad: 2.0, damping_nm_s: 0.5 };
+        let config = JointConfig {
+            joint: 0,
+            range_rad: (-1.0, 1.0),
+            torque_nm,
+            slew_nm_s: slew_nm.map(|slew_nm| 1e3 * slew_nm),
+            stop: stops.then_some(stop),
+        };
+        config.prepare(Period::from_us(1000).unwrap()).unwrap()
     }
 
     #[track_caller]
