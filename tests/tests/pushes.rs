@@ -8,7 +8,7 @@ use blindgrasp::sim::{Simulation, model};
 use blindgrasp_shared::math::Real;
 use nalgebra::{Matrix3, Vector3};
 
-/// A scene whose object is pushed, and its samples.
+/// The run of a scene whose object is pushed.
 fn pushed(name: &str, settings: &[&str], pushes: &[PushFile]) -> blindgrasp::sim::Run {
     let settings: Vec<String> = settings.iter().map(|&setting| setting.to_owned()).collect();
     let mut file = Scene::load(name, &settings).unwrap_or_else(|error| panic!("{error}")).file;
@@ -47,7 +47,11 @@ fn the_books_close_with_the_work_of_a_push() {
     assert!((coarse / fine).log2() > 1.8, "{}", (coarse / fine).log2());
 }
 
-/// An object that nothing holds: its momentum is the impulse, to rounding, and so is its angular momentum, at whatever step.
+/// An object that nothing holds: its momentum is the impulse, and so is its angular momentum, at whatever step; and the work is
+/// what it moves with.
+///
+/// Tolerance: rounding, 1e-16 of a second in each of up to 3000 steps, of impulses over 50 ms; the attitude, through which the spin
+/// is seen, is normalized in each of them. The cube's inertia is the same about every axis, so that the work is as exact.
 #[test]
 fn a_free_object_takes_the_impulse() {
     let scene = Scene::load("cube", &[]).expect("built in");
@@ -62,11 +66,9 @@ fn a_free_object_takes_the_impulse() {
         let still: JointVector = [0.0; blindgrasp::MAX_JOINTS];
         let start = Motion::at_rest(still, scene.start.position_m, scene.start.attitude);
         let mut plant = Plant::new(free, start, substep_s).expect("a plant");
-        while plant.solve(&still).is_ok() && plant.flows().velocity_squared * 0.0 == 0.0 {
+        for _ in 0..(0.3 / substep_s) as usize {
+            plant.solve(&still).expect("nothing to lose");
             plant.advance();
-            if (plant.motion().position_m - scene.start.position_m).norm() > 0.5 {
-                break;
-            }
         }
         plant.solve(&still).expect("nothing to lose");
         let motion = plant.motion();
@@ -77,14 +79,14 @@ fn a_free_object_takes_the_impulse() {
         let off = (momentum - force_n * effective_s).norm() / force_n.norm();
         let off_spin = (spin - moment_nm * effective_s).norm() / moment_nm.norm();
         println!("step {substep_s} s: off {off:.1e} and {off_spin:.1e}");
-        assert!(off < 1e-12 && off_spin < 1e-9, "{off} {off_spin}");
+        assert!(off < 1e-11 * effective_s && off_spin < 1e-11 * effective_s, "{off} {off_spin}");
         let kinetic_j = 0.5 * (momentum.norm_squared() / mass_kg + motion.spin_rad_s.dot(&spin));
         let work_j = plant.flows().pushes;
-        assert!((work_j / kinetic_j - 1.0).abs() < 1e-6, "{work_j} {kinetic_j}");
+        assert!((work_j / kinetic_j - 1.0).abs() < 1e-11, "{work_j} {kinetic_j}");
     }
 }
 
-/// Before a push, a run is the same to the bit; and what is not pushed comes back under a law that has springs at its joints.
+/// Before a push, a run is the same to the bit.
 #[test]
 fn nothing_happens_before_it() {
     let settings = ["duration_s=0.6"];

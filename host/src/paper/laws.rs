@@ -7,11 +7,6 @@ use crate::scene::file::{Control, SceneFile};
 use crate::sim::summary::Summary;
 use serde::Serialize;
 
-/// `K_st` of Table VII, N m.
-pub const ATTITUDE_STIFFNESS_NM: f64 = 5e-3;
-/// `K_I` where one is taken for many objects, N m/rad: the paper prints none. It is five times the least with which the cube is
-/// held (between 2e-3 and 4e-3, in the sweeps), where `K_st` of Table VII is three times its own least.
-pub const INTEGRAL_GAIN_NM_RAD: f64 = 2e-2;
 /// How often the law acts where it is as near to the continuous time of the theory as the tick goes, s.
 const CONTINUOUS_S: f64 = 1e-4;
 
@@ -40,15 +35,6 @@ impl Law {
         }
     }
 
-    /// The gain that is taken where there is one for many objects.
-    pub fn usual(self) -> f64 {
-        match self {
-            Self::NormalOnly => 0.0,
-            Self::Attitudes => ATTITUDE_STIFFNESS_NM,
-            Self::Integral => INTEGRAL_GAIN_NM_RAD,
-        }
-    }
-
     /// Makes it the law of a controller.
     pub fn set(self, control: &mut Control, gain: f64) {
         (control.attitude_stiffness_nm, control.integral_gain_nm_rad) = match self {
@@ -56,6 +42,43 @@ impl Law {
             Self::Attitudes => (gain, 0.0),
             Self::Integral => (0.0, gain),
         };
+    }
+}
+
+/// A law with its gain.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Case {
+    /// The law.
+    pub law: Law,
+    /// Its gain.
+    pub gain: f64,
+}
+
+/// Gains with which both laws are compared on many objects: `K_st` of Table VII and four times that, N m; and the same numbers
+/// for `K_I`, N m/rad, of which the paper prints none. For a small turn of a fingertip both are the moment for each radian, give
+/// or take the number of joints that turn; the least that hold the cube are 2e-3 for the one and 3e-3 for the other.
+pub const GAINS: [f64; 2] = [5e-3, 2e-2];
+
+impl Case {
+    /// `u_s` alone.
+    pub const NORMAL_ONLY: Self = Self { law: Law::NormalOnly, gain: 0.0 };
+    /// `u_s + u_st` with the gain of Table VII.
+    pub const PAPER: Self = Self { law: Law::Attitudes, gain: GAINS[0] };
+    /// What is compared on many objects.
+    pub const ALL: [Self; 5] = [
+        Self::NORMAL_ONLY,
+        Self::PAPER,
+        Self { law: Law::Attitudes, gain: GAINS[1] },
+        Self { law: Law::Integral, gain: GAINS[0] },
+        Self { law: Law::Integral, gain: GAINS[1] },
+    ];
+
+    /// In words.
+    pub fn words(self) -> String {
+        match self.law {
+            Law::NormalOnly => self.law.words().to_owned(),
+            law => format!("{}, {}", law.words(), self.gain),
+        }
     }
 }
 
@@ -79,29 +102,32 @@ impl Lost {
 /// What became of a grasp under a law.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Grasped {
-    /// The law.
-    pub law: Law,
+    /// The law with its gain.
+    pub case: Case,
     /// How it was lost with the law at the scene's rate, if it was.
     pub lost: Option<Lost>,
-    /// Only of one that was: how it was lost with the law at 10 kHz, if it was there too.
+    /// Only of one that was, and by a law that holds: how it was lost with the law at 10 kHz, if it was there too.
     pub lost_at_10_khz: Option<Lost>,
 }
 
 impl Grasped {
-    /// Grasps as a scene says, under a law with its usual gain; what is lost is tried again with the law at 10 kHz.
+    /// Grasps as a scene says, under a law; what is lost by a law that should hold it is tried again with the law at 10 kHz.
     ///
     /// # Errors
     /// A scene or a run that can't be done.
-    pub fn under(law: Law, run: &str, file: &SceneFile) -> Result<Self, EvidenceError> {
+    pub fn under(case: Case, run: &str, file: &SceneFile) -> Result<Self, EvidenceError> {
         let lost = |period_s: f64| -> Result<Option<Lost>, EvidenceError> {
             let mut file = file.clone();
-            law.set(&mut file.control, law.usual());
+            case.law.set(&mut file.control, case.gain);
             file.control.period_s = period_s;
             Ok(Lost::of(&simulation(run, &built(run, file)?)?.run_summed(|_| true)))
         };
         let at_its_rate = lost(file.control.period_s)?;
-        let lost_at_10_khz = if at_its_rate.is_some() { lost(CONTINUOUS_S)? } else { None };
-        Ok(Self { law, lost: at_its_rate, lost_at_10_khz })
+        let lost_at_10_khz = match &at_its_rate {
+            Some(_) if case.law != Law::NormalOnly => lost(CONTINUOUS_S)?,
+            other => other.clone(),
+        };
+        Ok(Self { case, lost: at_its_rate, lost_at_10_khz })
     }
 
     /// Held with the law at the scene's rate.

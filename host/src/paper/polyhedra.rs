@@ -1,7 +1,7 @@
-//! The paper's title: an *arbitrary* polyhedral object. Random convex polyhedra in the paper's own model, under each of the laws.
+//! The paper's title: an *arbitrary* polyhedral object. Random convex polyhedra in the paper's own model, under each law.
 
 use super::evidence::{EvidenceError, scene};
-use super::laws::{Grasped, Law};
+use super::laws::{Case, Grasped};
 use crate::population::{Draw, PlacingHand, RandomPolyhedron, SEED, polyhedra};
 use rayon::prelude::*;
 use serde::Serialize;
@@ -26,31 +26,31 @@ pub struct Outcome {
     pub faces: usize,
     /// Its largest distance between two corners, m.
     pub extent_m: f64,
-    /// Under each law.
+    /// Under each law, in the order of [`Case::ALL`].
     pub grasps: Vec<Grasped>,
 }
 
 impl Outcome {
-    /// Under a law.
-    pub fn under(&self, law: Law) -> Option<&Grasped> {
-        self.grasps.iter().find(|grasped| grasped.law == law)
+    /// Under a law with its gain.
+    pub fn under(&self, case: Case) -> Option<&Grasped> {
+        self.grasps.iter().find(|grasped| grasped.case == case)
     }
 
     /// Whether it was held under a law, at the rate of the experiments.
-    pub fn held(&self, law: Law) -> bool {
-        self.under(law).is_some_and(Grasped::held)
+    pub fn held(&self, case: Case) -> bool {
+        self.under(case).is_some_and(Grasped::held)
     }
 }
 
 impl Polyhedra {
     /// How many were held under a law, at the rate of the experiments.
-    pub fn held(&self, law: Law) -> usize {
-        self.count(law, Grasped::held)
+    pub fn held(&self, case: Case) -> usize {
+        self.count(case, Grasped::held)
     }
 
     /// How many were held under a law with the law at 10 kHz, or at less.
-    pub fn held_at_10_khz(&self, law: Law) -> usize {
-        self.count(law, Grasped::held_at_10_khz)
+    pub fn held_at_10_khz(&self, case: Case) -> usize {
+        self.count(case, Grasped::held_at_10_khz)
     }
 
     /// How many of those that were grasped, as a share of them.
@@ -58,8 +58,8 @@ impl Polyhedra {
         count as f64 / self.outcomes.len() as f64
     }
 
-    fn count(&self, law: Law, test: fn(&Grasped) -> bool) -> usize {
-        self.outcomes.iter().filter_map(|outcome| outcome.under(law)).filter(|grasped| test(grasped)).count()
+    fn count(&self, case: Case, test: fn(&Grasped) -> bool) -> usize {
+        self.outcomes.iter().filter_map(|outcome| outcome.under(case)).filter(|grasped| test(grasped)).count()
     }
 }
 
@@ -76,7 +76,7 @@ pub fn grasped(count: usize, told: &(dyn Fn(&str) + Sync)) -> Result<Polyhedra, 
         let placed = hand.place(hand.hull(body.corners_m.clone()), 1).ok().and_then(|mut all| all.pop());
         let grasps = placed.map(|placement| {
             let file = &placement.scene.file;
-            Law::ALL.into_iter().map(|law| Grasped::under(law, RUN, file)).collect::<Result<Vec<_>, _>>()
+            Case::ALL.into_iter().map(|case| Grasped::under(case, RUN, file)).collect::<Result<Vec<_>, _>>()
         });
         told(RUN);
         let outcome = |grasps| Outcome { faces: body.faces, extent_m: body.extent_m, grasps };

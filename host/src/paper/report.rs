@@ -39,7 +39,7 @@ pub struct Paper {
 }
 
 /// How many random polyhedra are grasped.
-const POLYHEDRA: usize = 120;
+const POLYHEDRA: usize = 100;
 
 /// How many runs are planned, a polyhedron for one; bisection adds a few.
 pub fn runs() -> usize {

@@ -24,6 +24,7 @@ pub(super) fn parts(file: &SceneFile) -> Result<Parts> {
         name(key, word)?;
     }
     let substeps = settings(file)?;
+    late_pushes(file, &mut warnings);
     let hand = hand(&file.hand, &mut warnings)?;
     let object = object(&file.object, &mut warnings)?;
     Ok(Parts { hand, object, substeps, warnings })
@@ -101,9 +102,7 @@ fn settings(file: &SceneFile) -> Result<usize> {
     }
     within("friction.scale", file.friction.scale, 0.0, 1e4)?;
     all_within("plant.gravity_m_s2", &file.plant.gravity_m_s2, 1000.0)?;
-    for (index, push) in file.plant.pushes.iter().enumerate() {
-        self::push(index, push, file.duration_s)?;
-    }
+    file.plant.pushes.iter().enumerate().try_for_each(|(index, push)| self::push(index, push))?;
     within("plant.substep_s", file.plant.substep_s, 1e-7, control.period_s)?;
     let ratio = control.period_s / file.plant.substep_s;
     let substeps = ratio.round();
@@ -120,8 +119,8 @@ fn settings(file: &SceneFile) -> Result<usize> {
     Ok(substeps as usize)
 }
 
-/// A push, which may not go unnoticed.
-fn push(index: usize, push: &PushFile, duration_s: f64) -> Result<()> {
+/// A push that does something.
+fn push(index: usize, push: &PushFile) -> Result<()> {
     let key = |key: &str| item("plant.push", index, key);
     within(&key("from_s"), push.from_s, 0.0, LONGEST_RUN_S)?;
     within(&key("for_s"), push.for_s, 1e-6, LONGEST_RUN_S)?;
@@ -131,14 +130,16 @@ fn push(index: usize, push: &PushFile, duration_s: f64) -> Result<()> {
     if push.force_n.iter().chain(&push.moment_nm).all(|part| *part == 0.0) {
         return fail(key("force_n"), "pushes with nothing", "give a force_n, a moment_nm, or both");
     }
-    if push.from_s >= duration_s {
-        return fail(
-            key("from_s"),
-            format!("{:?} s is not within the run of {duration_s:?} s", push.from_s),
-            "begin earlier, or let the run last longer (duration_s)",
-        );
-    }
     Ok(())
+}
+
+/// Pushes that come too late for the run: it may have been shortened for once.
+fn late_pushes(file: &SceneFile, warnings: &mut Vec<String>) {
+    let late = file.plant.pushes.iter().enumerate().filter(|(_, push)| push.from_s >= file.duration_s);
+    warnings.extend(late.map(|(index, push)| {
+        let key = item("plant.push", index, "from_s");
+        format!("{key}: the run of {:?} s is over before the push at {:?} s", file.duration_s, push.from_s)
+    }));
 }
 
 /// The gains, of a scene or of a hand.

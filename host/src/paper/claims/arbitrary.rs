@@ -1,7 +1,7 @@
 //! An arbitrary polyhedral object (the title, and advantage 1 of Sec. 1).
 
 use crate::paper::claim::{Claim, Figure, Row, Verdict, percent};
-use crate::paper::laws::Law::{Attitudes, NormalOnly};
+use crate::paper::laws::Case;
 use crate::paper::polyhedra::{Outcome, Polyhedra};
 
 pub(super) fn arbitrary(polyhedra: &Polyhedra) -> Claim {
@@ -24,15 +24,15 @@ fn share(polyhedra: &Polyhedra, held: usize) -> (f64, String) {
 }
 
 pub(super) fn every(polyhedra: &Polyhedra) -> Row {
-    let (with, words) = share(polyhedra, polyhedra.held(Attitudes));
-    let whys = || polyhedra.outcomes.iter().filter_map(|o| Some(&o.under(Attitudes)?.lost.as_ref()?.why));
+    let (with, words) = share(polyhedra, polyhedra.held(Case::PAPER));
+    let whys = || polyhedra.outcomes.iter().filter_map(|o| Some(&o.under(Case::PAPER)?.lost.as_ref()?.why));
     let (rolled, lost) = (whys().filter(|why| why.contains("rolled off")).count(), whys().count());
     Row {
         run: "every".to_owned(),
         measured: format!("{words} are held; {} were drawn", polyhedra.drawn),
         figures: vec![
             Figure::new("held_with_u_st", with, ""),
-            Figure::new("held_without", share(polyhedra, polyhedra.held(NormalOnly)).0, ""),
+            Figure::new("held_without", share(polyhedra, polyhedra.held(Case::NORMAL_ONLY)).0, ""),
         ],
         verdict: Verdict::holds(!polyhedra.outcomes.is_empty() && lost == 0),
         remark: if lost == 0 {
@@ -46,9 +46,9 @@ pub(super) fn every(polyhedra: &Polyhedra) -> Row {
 }
 
 pub(super) fn more(polyhedra: &Polyhedra) -> Row {
-    let held = |law| share(polyhedra, polyhedra.held(law));
-    let ((with, with_words), (without, without_words)) = (held(Attitudes), held(NormalOnly));
-    let only_without = |outcome: &&Outcome| outcome.held(NormalOnly) && !outcome.held(Attitudes);
+    let held = |case| share(polyhedra, polyhedra.held(case));
+    let ((with, with_words), (without, without_words)) = (held(Case::PAPER), held(Case::NORMAL_ONLY));
+    let only_without = |outcome: &&Outcome| outcome.held(Case::NORMAL_ONLY) && !outcome.held(Case::PAPER);
     let only_without = polyhedra.outcomes.iter().filter(only_without).count();
     Row {
         run: "more".to_owned(),

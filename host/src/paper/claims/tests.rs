@@ -2,9 +2,9 @@
 
 use super::*;
 use super::{arbitrary, bound, earlier, energy, forces, normal_only, reach, rest, start, wrench};
-use crate::paper::earlier::{Carried, Final};
+use crate::paper::earlier::{Carried, Final, Object};
 use crate::paper::evidence::scene as load;
-use crate::paper::laws::{Grasped, Law, Lost};
+use crate::paper::laws::{Case, GAINS, Grasped, Law, Lost};
 use crate::paper::polyhedra::{Outcome, Polyhedra};
 use crate::paper::sensitivity::Varied;
 use crate::sim::Simulation;
@@ -241,34 +241,34 @@ fn wrenches_and_starts() {
     assert_eq!(start::weight_row(&with, &without).verdict, NotReproduced);
 }
 
-/// Polyhedra that are held, or not, by each of the laws.
+/// Polyhedra that are held, or not, by each of the laws, with whatever gain.
 fn polyhedra(held: &[[bool; 3]]) -> Polyhedra {
     let lost = || Lost { at_s: 1.0, why: "finger 2 rolled off its face".to_owned() };
-    let grasped = |(law, held): (Law, &bool)| Grasped {
-        law,
-        lost: (!held).then(lost),
-        lost_at_10_khz: (!held).then(lost),
+    let grasped = |case: Case, held: &[bool; 3]| {
+        let held = held[case.law as usize];
+        Grasped { case, lost: (!held).then(lost), lost_at_10_khz: (!held).then(lost) }
     };
     let outcome = |held: &[bool; 3]| Outcome {
         faces: 9,
         extent_m: 0.1,
-        grasps: Law::ALL.into_iter().zip(held).map(grasped).collect(),
+        grasps: Case::ALL.into_iter().map(|case| grasped(case, held)).collect(),
     };
     Polyhedra { drawn: 9, duration_s: 5.0, outcomes: held.iter().map(outcome).collect() }
 }
 
 #[test]
 fn arbitrary_polyhedra() {
+    let expanded = |polyhedra: &Polyhedra| earlier::expanded_row(polyhedra, GAINS[0]).verdict;
     let held = polyhedra(&[[false, true, true]]);
     assert_eq!(arbitrary::every(&held).verdict, Reproduced);
     assert_eq!(arbitrary::more(&held).verdict, Reproduced);
     assert_eq!(earlier::effective_on_polyhedra(&held).verdict, Reproduced);
-    assert_eq!(earlier::expanded_row(&held).verdict, NotReproduced, "as many");
+    assert_eq!(expanded(&held), NotReproduced, "as many");
     let some = polyhedra(&[[false, true, false], [false, false, false]]);
     assert_eq!(arbitrary::every(&some).verdict, NotReproduced);
     assert_eq!(arbitrary::more(&some).verdict, Reproduced);
     assert_eq!(earlier::effective_on_polyhedra(&some).verdict, NotReproduced);
-    assert_eq!(earlier::expanded_row(&some).verdict, Reproduced);
+    assert_eq!(expanded(&some), Reproduced);
     let none = polyhedra(&[[true, false, true]]);
     assert_eq!(arbitrary::more(&none).verdict, NotReproduced);
     assert_eq!(arbitrary::every(&polyhedra(&[])).verdict, NotReproduced);
@@ -278,7 +278,7 @@ fn arbitrary_polyhedra() {
 fn end(law: Law, off: f64, moved_m: f64) -> Final {
     Final {
         law,
-        gain: law.usual(),
+        gain: GAINS[0],
         path: "not pushed",
         lost: None,
         pushed_m: 0.01,
@@ -307,17 +307,11 @@ fn the_earlier_law() {
     let pose = |attitudes_m: f64, integral_m: f64| {
         let ends = [(Attitudes, attitudes_m), (Integral, integral_m)];
         let ends = ends.iter().flat_map(|&(law, far_m)| [end(law, 0.0, 0.0), end(law, 0.0, far_m)]);
-        // The usual gains differ: the same ends with a gain that both have.
-        let same = |mut end: Final| {
-            end.gain = 0.5;
-            end
-        };
-        let ends: Vec<Final> = ends.collect();
-        earlier::pose_row(&of(ends.iter().cloned().chain(ends.iter().cloned().map(same)).collect())).verdict
+        earlier::pose_row(&of(ends.collect()), GAINS[0]).verdict
     };
     assert_eq!((pose(0.01, 0.02), pose(0.02, 0.01)), (Reproduced, NotReproduced));
     assert_eq!(pose(0.01, 0.01), NotReproduced);
-    assert_eq!(earlier::pose_row(&of(Vec::new())).verdict, NotReproduced);
+    assert_eq!(earlier::pose_row(&of(Vec::new()), GAINS[0]).verdict, NotReproduced);
 
     let disturbs = |law, arm_torque_nm| {
         let carried = Carried {
@@ -334,6 +328,15 @@ fn the_earlier_law() {
     assert_eq!((disturbs(Attitudes, 1e-14), disturbs(Attitudes, 1e-3)), (Reproduced, NotReproduced));
     assert_eq!((disturbs(Integral, 1e-14), disturbs(Integral, 1e-3)), (NotReproduced, Reproduced));
     assert_eq!(disturbs(Integral, f64::NAN), NotReproduced);
+
+    // By each law, the cube.
+    let cube = |held: [bool; 3]| {
+        let grasps = polyhedra(&[held]).outcomes.remove(0).grasps;
+        let objects = vec![Object { name: "cube", duration_s: 10.0, grasps }];
+        earlier::effective_on_the_cube(&Comparison { objects, ..Comparison::default() }).verdict
+    };
+    assert_eq!(cube([false, true, true]), Reproduced);
+    assert_eq!((cube([true, true, true]), cube([false, true, false])), (NotReproduced, NotReproduced));
     assert_eq!(earlier::effective_on_the_cube(&of(Vec::new())).verdict, NotReproduced);
 }
 

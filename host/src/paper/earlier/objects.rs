@@ -1,7 +1,7 @@
 //! Objects of several shapes, under each law.
 
 use crate::paper::evidence::{EvidenceError, scene};
-use crate::paper::laws::{Grasped, Law};
+use crate::paper::laws::{Case, Grasped};
 use crate::population::PlacingHand;
 use crate::scene::file::SceneFile;
 use rayon::prelude::*;
@@ -18,14 +18,14 @@ pub struct Object {
     pub name: &'static str,
     /// How long it was grasped, s.
     pub duration_s: f64,
-    /// Under each law.
+    /// Under each law, in the order of [`Case::ALL`].
     pub grasps: Vec<Grasped>,
 }
 
 impl Object {
-    /// Under a law.
-    pub fn under(&self, law: Law) -> Option<&Grasped> {
-        self.grasps.iter().find(|grasped| grasped.law == law)
+    /// Under a law with its gain.
+    pub fn under(&self, case: Case) -> Option<&Grasped> {
+        self.grasps.iter().find(|grasped| grasped.case == case)
     }
 }
 
@@ -61,7 +61,7 @@ fn octahedron() -> Result<SceneFile, EvidenceError> {
 pub(super) fn grasp(told: &(dyn Fn(&str) + Sync)) -> Result<Vec<Object>, EvidenceError> {
     let one = |(name, file): &Shape| {
         let file = file()?;
-        let grasps = Law::ALL.into_par_iter().map(|law| Grasped::under(law, RUN, &file));
+        let grasps = Case::ALL.into_par_iter().map(|case| Grasped::under(case, RUN, &file));
         let grasps = grasps.collect::<Result<_, _>>()?;
         told(RUN);
         Ok(Object { name, duration_s: file.duration_s, grasps })

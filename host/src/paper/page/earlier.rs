@@ -3,7 +3,7 @@
 use super::section as section_with;
 use crate::paper::claim::percent;
 use crate::paper::earlier::Comparison;
-use crate::paper::laws::{Grasped, Law};
+use crate::paper::laws::{Case, Grasped};
 use crate::paper::polyhedra::{Outcome, Polyhedra};
 use maud::{Markup, html};
 use std::ops::RangeInclusive;
@@ -25,21 +25,21 @@ pub(super) fn section(comparison: &Comparison, polyhedra: &Polyhedra) -> Markup 
             }
             table.stack {
                 caption {
-                    "Held or lost, in the paper's model, with the law at 1 kHz; in brackets at 10 kHz, where that is different. K_st = "
-                    (Law::Attitudes.usual()) " N m, K_I = " (Law::Integral.usual()) " N m/rad"
+                    "Held or lost, in the paper's model, with the law at 1 kHz; in brackets at 10 kHz, where that is different. Gains: K_st in N m, \
+                     K_I in N m/rad"
                 }
                 thead {
                     tr {
                         th scope="col" { "Object" }
-                        @for law in Law::ALL { th scope="col" { (law.words()) } }
+                        @for case in Case::ALL { th scope="col" { (case.words()) } }
                     }
                 }
                 tbody {
                     @for object in &comparison.objects {
                         tr {
                             th scope="row" { (object.name) ", " (object.duration_s) " s" }
-                            @for law in Law::ALL {
-                                td data-label=(law.words()) { @if let Some(grasped) = object.under(law) { (outcome(grasped)) } }
+                            @for case in Case::ALL {
+                                td data-label=(case.words()) { @if let Some(grasped) = object.under(case) { (outcome(grasped)) } }
                             }
                         }
                     }
@@ -68,18 +68,18 @@ fn outcome(grasped: &Grasped) -> Markup {
 
 /// How many of some polyhedra each law holds.
 fn shares(name: &str, outcomes: &[&Outcome]) -> Markup {
-    let held = |law, test: fn(&Grasped) -> bool| {
-        outcomes.iter().filter(|outcome| outcome.under(law).is_some_and(test)).count()
+    let held = |case, test: fn(&Grasped) -> bool| {
+        outcomes.iter().filter(|outcome| outcome.under(case).is_some_and(test)).count()
     };
     html! {
         tr {
             th scope="row" { (name) }
-            @for law in Law::ALL {
-                @let (usual, often) = (held(law, Grasped::held), held(law, Grasped::held_at_10_khz));
-                td data-label=(law.words()) {
-                    (usual) " of " (outcomes.len())
-                    @if !outcomes.is_empty() { ", " (percent(usual as f64 / outcomes.len() as f64)) }
-                    @if often != usual { " (" (often) ")" }
+            @for case in Case::ALL {
+                @let (held, often) = (held(case, Grasped::held), held(case, Grasped::held_at_10_khz));
+                td data-label=(case.words()) {
+                    (held) " of " (outcomes.len())
+                    @if !outcomes.is_empty() { ", " (percent(held as f64 / outcomes.len() as f64)) }
+                    @if often != held { " (" (often) ")" }
                 }
             }
         }

@@ -3,14 +3,15 @@
 use super::claims::{class, sign};
 use crate::paper::claim::{Verdict, number};
 use crate::paper::evidence::Done;
-use crate::paper::laws::Law;
+use crate::paper::laws::Case;
 use crate::paper::report::Paper;
 use crate::paper::sensitivity::Limits;
 use crate::sweep::Value;
 use maud::{Markup, html};
 
 pub(super) fn summary(paper: &Paper) -> Markup {
-    let sentences = [theory(paper), stiffness(paper), arm(paper), polyhedra(paper), friction(paper)];
+    let sentences =
+        [theory(paper), stiffness(paper), arm(paper), polyhedra(paper), earlier(paper), friction(paper)];
     html! {
         section aria-labelledby="summary" {
             h2.first id="summary" { "In short" }
@@ -67,13 +68,38 @@ fn arm(paper: &Paper) -> Sentence {
 fn polyhedra(paper: &Paper) -> Sentence {
     let polyhedra = &paper.polyhedra;
     let [with, without] =
-        [Law::Attitudes, Law::NormalOnly].map(|law| 100.0 * polyhedra.share(polyhedra.held(law)));
+        [Case::PAPER, Case::NORMAL_ONLY].map(|case| 100.0 * polyhedra.share(polyhedra.held(case)));
     let count = polyhedra.outcomes.len();
     let numbers =
         format!("Of {count} random convex ones {with:.0} % are held with u_st, {without:.0} % without.");
     Some((
         Verdict::of(with >= 100.0, with > without),
         "An arbitrary polyhedron is too much said, many more is not.",
+        numbers,
+    ))
+}
+
+/// The law before the paper's.
+fn earlier(paper: &Paper) -> Sentence {
+    let verdict = |key: &str| {
+        let rows = paper.claims.iter().filter(|claim| claim.key == key).flat_map(|claim| &claim.rows);
+        rows.map(|row| row.verdict).min()
+    };
+    let (pose, disturbs) = (verdict("earlier-pose")?, verdict("earlier-disturbs")?);
+    let holds = disturbs == Verdict::Reproduced;
+    let numbers = format!(
+        "An arm {} u_st and {} the earlier integral; the final pose {}.",
+        if holds { "does not feel" } else { "feels" },
+        if holds { "feels" } else { "does not feel" },
+        if pose == Verdict::Reproduced {
+            "is what u_st determines better"
+        } else {
+            "is what the integral determines better, against the paper's words"
+        }
+    );
+    Some((
+        Verdict::of(holds && pose == Verdict::Reproduced, holds),
+        "Against the earlier law, half is shown.",
         numbers,
     ))
 }

@@ -6,7 +6,7 @@ mod refusals;
 
 use super::*;
 use crate::Posture;
-use crate::scene::file::{ContactFile, Indentation, InertiaFile, ShapeFile};
+use crate::scene::file::{ContactFile, Indentation, InertiaFile, PushFile, ShapeFile};
 
 /// A sequence of numbers that is the same everywhere.
 pub(super) struct Numbers(pub(super) u64);
@@ -223,6 +223,16 @@ fn what_is_odd_is_a_warning() {
     assert!(scene.warnings[0].contains("larger than the sum of the two others"), "{:?}", scene.warnings);
     let scene = load("cube", &["hand.joint.2.inertia_kg_m2=[1e-5, 1e-5, 3e-5]"]).unwrap();
     assert!(scene.warnings[0].starts_with("link `finger-1-flex-1`"), "{:?}", scene.warnings);
+}
+
+/// A push that comes too late is said, and not refused: a run may be shortened for once.
+#[test]
+fn a_push_after_the_end_is_warned_of() {
+    let mut file = load("cube", &["duration_s=1.5"]).unwrap().file;
+    let push = PushFile { from_s: 1.0, for_s: 0.5, force_n: [0.1, 0.0, 0.0], ..PushFile::default() };
+    file.plant.pushes = vec![push.clone(), PushFile { from_s: 1.5, ..push }];
+    let scene = Scene::build(file).unwrap();
+    assert_eq!(scene.warnings, ["plant.push.2.from_s: the run of 1.5 s is over before the push at 1.5 s"]);
 }
 
 #[test]
