@@ -144,41 +144,49 @@ fn dense(criterion: &mut Criterion, record: &Record<f32, J>) {
     group.finish();
 }
 
+/// A step of the plant, and with it the paper's two hands: solving and advancing, without the controller.
 fn plant(criterion: &mut Criterion) {
-    let scene = Scene::load("cube-ideal", &[]).expect("the scene is built in");
-    let mut angles = [0.0; MAX_JOINTS];
-    angles[..J].copy_from_slice(&scene.start.angles_rad);
-    let start = Motion::at_rest(angles, scene.start.position_m, scene.start.attitude);
-    let begin = || Plant::new(sim::model(&scene), start, scene.plant.substep_s).expect("a plant");
-    let law = sim::law(&scene).expect("gains");
-    let mut posture = Posture::at_base();
-    scene.hand.forward_kinematics(&angles, &mut posture);
-    let latch = Latch::of(&posture, &angles);
-    let grip = law.grip(&latch);
-    let (torques, _) = law.torques(&scene.hand, &posture, &angles, &[0.0; MAX_JOINTS], Some(grip));
-    let mut plant = begin();
-    let mut steps = 0;
-    criterion.bench_function("plant step (12 joints and cube)", |bencher| {
-        bencher.iter(|| {
-            // Constant torques lose the grasp in the end: begin anew well before that.
-            steps += 1;
-            if steps % 100 == 0 {
-                plant = begin();
-            }
-            plant.solve(black_box(&torques)).expect("the grasp holds");
-            plant.advance();
+    for (name, what) in
+        [("cube-ideal", "12 joints, cube"), ("prism-ideal", "12 joints, prism"), ("hand-arm", "hand-arm")]
+    {
+        let scene = Scene::load(name, &[]).expect("the scene is built in");
+        let mut angles = [0.0; MAX_JOINTS];
+        angles[..scene.start.angles_rad.len()].copy_from_slice(&scene.start.angles_rad);
+        let start = Motion::at_rest(angles, scene.start.position_m, scene.start.attitude);
+        let begin = || Plant::new(sim::model(&scene), start, scene.plant.substep_s).expect("a plant");
+        let law = sim::law(&scene).expect("gains");
+        let mut posture = Posture::at_base();
+        scene.hand.forward_kinematics(&angles, &mut posture);
+        let latch = Latch::of(&posture, &angles);
+        let grip = law.grip(&latch);
+        let (torques, _) = law.torques(&scene.hand, &posture, &angles, &[0.0; MAX_JOINTS], Some(grip));
+        let mut plant = begin();
+        let mut steps = 0;
+        criterion.bench_function(&format!("plant step ({what})"), |bencher| {
+            bencher.iter(|| {
+                // Constant torques lose the grasp in the end: begin anew well before that.
+                steps += 1;
+                if steps % 100 == 0 {
+                    plant = begin();
+                }
+                plant.solve(black_box(&torques)).expect("the grasp holds");
+                plant.advance();
+            });
         });
-    });
+    }
 }
 
+/// Whole runs, with the controller, and what is recorded.
 fn run(criterion: &mut Criterion) {
-    let scene = Scene::load("cube", &["duration_s=1.0".to_owned()]).expect("the scene is built in");
     let mut group = criterion.benchmark_group("sim");
-    // Elements are simulated seconds, so that the throughput is the real-time factor.
-    group.throughput(Throughput::Elements(1)).sample_size(20);
-    group.bench_function("cube, 1 s simulated", |bencher| {
-        bencher.iter(|| Simulation::new(&scene).expect("a simulation").run(|_| {}));
-    });
+    // Elements are simulated milliseconds.
+    group.throughput(Throughput::Elements(1000)).sample_size(20);
+    for name in ["cube", "prism", "hand-arm"] {
+        let scene = Scene::load(name, &["duration_s=1.0".to_owned()]).expect("the scene is built in");
+        group.bench_function(format!("{name}, 1 s simulated"), |bencher| {
+            bencher.iter(|| Simulation::new(&scene).expect("a simulation").run(|_| {}));
+        });
+    }
     group.finish();
 }
 

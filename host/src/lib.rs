@@ -20,6 +20,7 @@ pub mod monitor;
 pub mod paper;
 pub mod placement;
 pub mod plant;
+pub mod population;
 pub mod record;
 #[cfg(feature = "command")]
 pub mod report;

@@ -332,7 +332,7 @@ fn what_cannot_be_swept_is_refused_with_what_to_do() {
         ),
         (
             vec!["ball", "--vary", "control.force_n=4,5", "--out", "x.csv"],
-            "ball: no built-in scene is called `ball`; known: prism, cube, prism-ideal, cube-ideal, cube-normal-only, hand-arm, hand-arm-consistent, hand-arm-firm, l-bracket, two-finger-prism, four-finger-cube, allegro-like-prism (a path has to end in .toml or contain a /)",
+            "ball: no built-in scene is called `ball`; known: prism, cube, prism-ideal, cube-ideal, prism-normal-only, cube-normal-only, hand-arm, hand-arm-consistent, hand-arm-firm, hand-arm-normal-only, l-bracket, two-finger-prism, four-finger-cube, allegro-like-prism (a path has to end in .toml or contain a /)",
         ),
         (
             with(&["--set", "control.force_n=3"]),

@@ -160,9 +160,7 @@ impl<const J: usize> Tracks<f32, J> {
         to.u8(u8::from(self.started))?;
         for track in self.tracks.iter().take(joints) {
             to.u32(track.count as u32)?;
-            to.f32(track.play)?;
-            to.f32(track.ahead)?;
-            to.f32(track.speed)?;
+            to.f32s(&[track.play, track.ahead, track.speed], 3)?;
         }
         Ok(())
     }
@@ -217,8 +215,7 @@ impl<const J: usize> Motion<f32, J> {
     /// Without what has changed in the tick: that says something of its own tick only.
     pub(crate) fn save(&self, joints: usize, to: &mut Saver<'_>) -> Result<(), BufferTooSmall> {
         for (&angle_rad, &speed_rad_s) in self.angles_rad.iter().zip(&self.speeds_rad_s).take(joints) {
-            to.f32(angle_rad)?;
-            to.f32(speed_rad_s)?;
+            to.f32s(&[angle_rad, speed_rad_s], 2)?;
         }
         Ok(())
     }

@@ -191,7 +191,7 @@ impl<T: Real, const J: usize> Ledger<T, J> {
 
 impl<const J: usize> Ledger<f32, J> {
     pub(crate) fn save(&self, joints: usize, to: &mut Saver<'_>) -> Result<(), BufferTooSmall> {
-        self.before_nm.iter().take(joints).try_for_each(|&torque| to.f32(torque))?;
+        to.f32s(&self.before_nm, joints)?;
         for term in &self.terms {
             to.f32(term.gain)?;
             to.f32(term.potential_j)?;
@@ -205,9 +205,7 @@ impl<const J: usize> Ledger<f32, J> {
 
     pub(crate) fn load(joints: usize, from: &mut Loader<'_>) -> Result<Self, SnapshotError> {
         let mut ledger = Self::new();
-        for torque in ledger.before_nm.iter_mut().take(joints) {
-            *torque = from.f32()?;
-        }
+        from.f32s(&mut ledger.before_nm, joints)?;
         for term in &mut ledger.terms {
             *term = Term { gain: from.f32()?, potential_j: from.f32()? };
         }

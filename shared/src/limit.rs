@@ -191,22 +191,18 @@ impl<T: Real, const J: usize> LimitConfig<T, J> {
         let joint_count = hand.joint_count().min(J);
         let mut joints = [JointLimits { torque_nm: None, slew_nm: None, stop: None }; J];
         for (k, joint) in joints.iter_mut().enumerate().take(joint_count) {
-            let fail = |parameter, reason| Err(ParameterError { parameter, joint: Some(k), reason });
-            if let Some(torque_nm) = self.torque_nm {
-                if !is_positive(torque_nm[k]) {
-                    return fail("limits.torque_nm", "has to be positive");
-                }
-                joint.torque_nm = Some(torque_nm[k]);
-            }
-            if let Some(slew_nm_s) = self.slew_nm_s {
-                if !is_positive(slew_nm_s[k]) {
-                    return fail("limits.slew_nm_s", "has to be positive");
-                }
-                joint.slew_nm = Some(slew_nm_s[k] * period.seconds());
-            }
-            if let Some(stops) = &self.stops {
-                joint.stop = Some(stops.prepare(k, hand.range_rad(k))?);
-            }
+            let of_joint = JointConfig {
+                joint: k,
+                range_rad: hand.range_rad(k),
+                torque_nm: self.torque_nm.map(|torques| torques[k]),
+                slew_nm_s: self.slew_nm_s.map(|slews| slews[k]),
+                stop: self.stops.as_ref().map(|stops| StopConfigOf {
+                    margin_rad: stops.margin_rad[k],
+                    stiffness_nm_rad: stops.stiffness_nm_rad[k],
+                    damping_nm_s: stops.damping_nm_s[k],
+                }),
+            };
+            *joint = of_joint.prepare(period)?;
         }
         Ok(Limits {
             force_n: self.force_n,
@@ -218,28 +214,64 @@ impl<T: Real, const J: usize> LimitConfig<T, J> {
     }
 }
 
-impl<T: Real, const J: usize> StopConfig<T, J> {
-    fn prepare(&self, joint: usize, range_rad: (T, T)) -> Result<Stop<T>, ParameterError> {
-        let fail = |parameter, reason| Err(ParameterError { parameter, joint: Some(joint), reason });
-        let (lower, upper) = range_rad;
-        let margin = self.margin_rad[joint];
-        if !(is_positive(margin) && margin + margin <= upper - lower) {
-            return fail("limits.stops.margin_rad", "has to be positive and at most half the joint's range");
+/// What is configured for one joint.
+struct JointConfig<T> {
+    joint: usize,
+    range_rad: (T, T),
+    torque_nm: Option<T>,
+    slew_nm_s: Option<T>,
+    stop: Option<StopConfigOf<T>>,
+}
+
+/// The soft end stops of one joint.
+struct StopConfigOf<T> {
+    margin_rad: T,
+    stiffness_nm_rad: T,
+    damping_nm_s: T,
+}
+
+impl<T: Real> JointConfig<T> {
+    /// Not inlined: the firmware would have it once for each joint.
+    #[inline(never)]
+    fn prepare(&self, period: Period) -> Result<JointLimits<T>, ParameterError> {
+        let positive = |value: Option<T>, parameter| match value {
+            Some(value) if !is_positive(value) => self.fail(parameter, "has to be positive"),
+            value => Ok(value),
+        };
+        Ok(JointLimits {
+            torque_nm: positive(self.torque_nm, "limits.torque_nm")?,
+            slew_nm: positive(self.slew_nm_s, "limits.slew_nm_s")?.map(|slew| slew * period.seconds()),
+            stop: match &self.stop {
+                Some(stop) => Some(self.prepare_stop(stop)?),
+                None => None,
+            },
+        })
+    }
+
+    fn prepare_stop(&self, stop: &StopConfigOf<T>) -> Result<Stop<T>, ParameterError> {
+        let &StopConfigOf { margin_rad, stiffness_nm_rad, damping_nm_s } = stop;
+        let (lower, upper) = self.range_rad;
+        if !(is_positive(margin_rad) && margin_rad + margin_rad <= upper - lower) {
+            let reason = "has to be positive and at most half the joint's range";
+            return self.fail("limits.stops.margin_rad", reason);
         }
-        let (stiffness_nm_rad, damping_nm_s) = (self.stiffness_nm_rad[joint], self.damping_nm_s[joint]);
         if !(stiffness_nm_rad >= T::zero() && stiffness_nm_rad.is_finite()) {
-            return fail("limits.stops.stiffness_nm_rad", "has to be zero or positive");
+            return self.fail("limits.stops.stiffness_nm_rad", "has to be zero or positive");
         }
         if !(damping_nm_s >= T::zero() && damping_nm_s.is_finite()) {
-            return fail("limits.stops.damping_nm_s", "has to be zero or positive");
+            return self.fail("limits.stops.damping_nm_s", "has to be zero or positive");
         }
         Ok(Stop {
-            lower_rad: lower + margin,
-            upper_rad: upper - margin,
-            per_margin: T::one() / margin,
+            lower_rad: lower + margin_rad,
+            upper_rad: upper - margin_rad,
+            per_margin: T::one() / margin_rad,
             stiffness_nm_rad,
             damping_nm_s,
         })
+    }
+
+    fn fail<R>(&self, parameter: &'static str, reason: &'static str) -> Result<R, ParameterError> {
+        Err(ParameterError { parameter, joint: Some(self.joint), reason })
     }
 }
 
@@ -337,11 +369,17 @@ mod tests {
     use super::*;
     use std::string::ToString;
 
-    /// Range -1 to 1 rad, margin 0.1 rad.
+    /// Range -1 to 1 rad, margin 0.1 rad; ticks of a millisecond.
     fn joint(torque_nm: Option<f64>, slew_nm: Option<f64>, stops: bool) -> JointLimits<f64> {
-        let stop = StopConfig { margin_rad: [0.1], stiffness_nm_rad: [2.0], damping_nm_s: [0.5] };
-        let stop = stops.then(|| stop.prepare(0, (-1.0, 1.0)).unwrap());
-        JointLimits { torque_nm, slew_nm, stop }
+        let stop = StopConfigOf { margin_rad: 0.1, stiffness_nm_rad: 2.0, damping_nm_s: 0.5 };
+        let config = JointConfig {
+            joint: 0,
+            range_rad: (-1.0, 1.0),
+            torque_nm,
+            slew_nm_s: slew_nm.map(|slew_nm| 1e3 * slew_nm),
+            stop: stops.then_some(stop),
+        };
+        config.prepare(Period::from_us(1000).unwrap()).unwrap()
     }
 
     #[track_caller]

@@ -294,6 +294,15 @@ impl Supervisor {
         }
     }
 
+    /// Whether the force is on its way up or down, so that torques change with it.
+    pub fn ramps<T: Real>(&self, ramps: &Ramps<T>) -> bool {
+        match self.mode {
+            Mode::Disarmed | Mode::Armed | Mode::Fault => false,
+            Mode::Grasping => self.age < ramps.soft_start.ticks,
+            Mode::Releasing => true,
+        }
+    }
+
     fn obey(
         &mut self,
         command: Command,

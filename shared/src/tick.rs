@@ -19,7 +19,7 @@ use crate::command::{Command, Grasp, Refusal};
 use crate::control::{Gains, GraspConfig, GraspLaw, Grip, Latch, Monitor};
 use crate::estimate::{Estimator, EstimatorConfig, Motion};
 use crate::event::{Event, Events};
-use crate::fault::{Fault, FaultConfig, Raised, Watch};
+use crate::fault::{Driven, Fault, FaultConfig, Raised, Watch};
 use crate::hand::Hand;
 use crate::ledger::{Doing, Entry};
 use crate::limit::{LimitConfig, Limiting, Limits};
@@ -316,8 +316,12 @@ fn watch<T: Real, const J: usize, const F: usize>(
     let silent = params.prepared.watch.heartbeat(watched, input.events.contains(Event::Heartbeat));
     let frozen = match input.sensed {
         Sensed::Counts(_) => {
-            let grasping = matches!(supervisor.mode(), Mode::Grasping | Mode::Releasing);
-            params.prepared.watch.standstill(watched, motion, torques_nm, grasping)
+            let driven = match supervisor.mode() {
+                Mode::Disarmed | Mode::Armed | Mode::Fault => Driven::Otherwise,
+                Mode::Grasping | Mode::Releasing if supervisor.ramps(&params.prepared.ramps) => Driven::Ramp,
+                Mode::Grasping | Mode::Releasing => Driven::Steadily,
+            };
+            params.prepared.watch.standstill(watched, motion, torques_nm, driven)
         }
         Sensed::Ideal { .. } | Sensed::Failed(_) => None,
     };

@@ -6,7 +6,7 @@ use blindgrasp_shared::command::{Command, Grasp};
 use blindgrasp_shared::fault::{Fault, Raised};
 use blindgrasp_shared::supervisor::Mode;
 use blindgrasp_shared::telemetry::Record;
-use blindgrasp_shared::tick::{Input, State, tick};
+use blindgrasp_shared::tick::{Config, Input, State, tick};
 use common::{JOINTS, config, facing_counts, params};
 use std::fmt;
 
@@ -42,8 +42,8 @@ impl Fnv {
 
 /// A hand of some capacity through 5,000 ticks of jittering, wandering and now and then impossible counts and of
 /// commands in any order; the hashes of all torques and of all records, and how many ticks were spent in each mode.
-fn run<const J: usize, const F: usize>() -> (Fnv, Fnv, [u32; 5]) {
-    let params = params::<f32, J, F>(&config());
+fn run<const J: usize, const F: usize>(config: &Config<f32, J>) -> (Fnv, Fnv, [u32; 5]) {
+    let params = params::<f32, J, F>(config);
     let mut state = State::new();
     let mut lcg = Lcg(2009);
     let (mut torques, mut records) = (Fnv::START, Fnv::START);
@@ -92,14 +92,32 @@ fn run<const J: usize, const F: usize>() -> (Fnv, Fnv, [u32; 5]) {
 /// change, so are the hashes. That of the torques outlives a record that tells more.
 #[test]
 fn the_bits_are_those_of_every_other_machine() {
-    let (torques, records, ticks_in) = run::<12, 3>();
+    let (torques, records, ticks_in) = run::<12, 3>(&config());
     println!("torques {torques:?}, records {records:?}, ticks in each mode {ticks_in:?}");
     assert!(ticks_in.iter().all(|&ticks| ticks >= 100), "{ticks_in:?}");
     assert_eq!(torques, Fnv(0x2986_1f50_40fb_190d));
     assert_eq!(records, Fnv(0x0317_4738_c7e2_30f1));
 }
 
+/// The same hand with the earlier law: `u_I` in the place of `u_st`.
+fn earlier<const J: usize>() -> Config<f32, J> {
+    let mut config = config();
+    (config.law.attitude_stiffness_nm, config.law.integral_gain_nm_rad) = (0.0, 0.02);
+    config
+}
+
+/// What is compiled for the microcontroller is compared with the host in `tests/tests/pil.rs`.
+#[test]
+fn the_bits_of_the_earlier_law_are_those_of_every_other_machine() {
+    let (torques, records, ticks_in) = run::<12, 3>(&earlier());
+    println!("torques {torques:?}, records {records:?}, ticks in each mode {ticks_in:?}");
+    assert!(ticks_in.iter().all(|&ticks| ticks >= 100), "{ticks_in:?}");
+    assert_eq!(torques, Fnv(0xac55_ea9c_cd4d_190e));
+    assert_eq!(records, Fnv(0x8c16_9422_d042_9717));
+}
+
 #[test]
 fn the_bits_do_not_depend_on_the_capacity() {
-    assert_eq!(run::<12, 3>(), run::<20, 5>());
+    assert_eq!(run::<12, 3>(&config()), run::<20, 5>(&config()));
+    assert_eq!(run::<12, 3>(&earlier()), run::<20, 5>(&earlier()));
 }

@@ -119,7 +119,7 @@ impl Stretches {
         let index = random.below(JOINTS) as u8;
         match random.below(9) {
             0 => Request::Command(Command::Arm),
-            1 => Request::Command(Command::Grasp(Grasp { force_n: Some(5.0), attitude_stiffness_nm: None })),
+            1 => Request::Command(Command::Grasp(Grasp { force_n: Some(5.0), ..Grasp::CONFIGURED })),
             2 => Request::Command(Command::Release),
             3 => Request::Command(Command::ClearFault),
             4 => Request::Heartbeat,

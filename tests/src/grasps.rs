@@ -143,6 +143,7 @@ impl Grasp {
             faces,
             hand_gravity_m_s2: GRAVITY_M_S2,
             object_gravity_m_s2: Vector3::zeros(),
+            pushes: Vec::new(),
         };
         let start = Motion::at_rest(angles_rad, held.position_m, held.attitude);
         Self { description, model, start, law, latch: Latch::of(&posture, &angles_rad) }

@@ -6,13 +6,14 @@
 //! - [`cases`]: random hands with the grasp law, and the paper's potentials as they are printed.
 //! - [`description`]: a hand in the user's frames, with forward kinematics written a second time, straight from the
 //!   description.
-//! - [`random`]: seeded random numbers, rotations, inertias and hands.
+//! - [`random`]: seeded random inertias and hands.
 //! - [`generated`]: parts of documents that tests make.
 //! - [`hands`]: the paper's three-fingered hand, and the same hand on an arm.
 //! - [`images`]: the images for the microcontroller, built.
 //! - [`grasps`]: a hand, an object, a plant and the grasp law, ready to run.
+//! - [`noise`]: meshes of polyhedra with noise.
 //! - [`numeric`]: derivatives by differences, and the largest of many errors.
-//! - [`polyhedra`]: random convex polyhedra, and meshes of them with noise.
+//! - [`rolling`]: random states of a hand with its fingertips on an object, and what the plant makes of them.
 //! - [`study`]: many objects, placed in the hand and grasped.
 //! - [`supervised`]: a simulated hand whose controller is watched, with things that go wrong.
 //! - [`thumb`]: what the functions of an image for the microcontroller call, and how much stack they take.
@@ -31,9 +32,10 @@ pub mod generated;
 pub mod grasps;
 pub mod hands;
 pub mod images;
+pub mod noise;
 pub mod numeric;
-pub mod polyhedra;
 pub mod random;
+pub mod rolling;
 pub mod study;
 pub mod supervised;
 pub mod thumb;

@@ -1,54 +1,34 @@
-//! Seeded random numbers, rotations, inertias and hands. The same seed gives the same hand on every machine.
+//! Seeded random inertias and hands, besides what the library draws. The same seed gives the same hand on every machine.
 
-use crate::description::{Description, rodrigues};
+use crate::description::Description;
+use blindgrasp::population;
 use blindgrasp_shared::hand::{Fingertip, Joint, Link};
-use blindgrasp_shared::math::Real;
 use nalgebra::{Matrix3, Vector3};
 use std::f64::consts::PI;
-use std::ops::RangeInclusive;
+use std::ops::{Deref, DerefMut};
 
-/// A source of random things.
+/// A source of random things: of all that the library draws, and of hands.
 #[derive(Clone, Debug)]
-pub struct Draw(fastrand::Rng);
+pub struct Draw(population::Draw);
+
+impl Deref for Draw {
+    type Target = population::Draw;
+
+    fn deref(&self) -> &population::Draw {
+        &self.0
+    }
+}
+
+impl DerefMut for Draw {
+    fn deref_mut(&mut self) -> &mut population::Draw {
+        &mut self.0
+    }
+}
 
 impl Draw {
     /// From a seed.
     pub fn new(seed: u64) -> Self {
-        Self(fastrand::Rng::with_seed(seed))
-    }
-
-    /// A number between two others.
-    pub fn within(&mut self, low: f64, high: f64) -> f64 {
-        low + (high - low) * self.0.f64()
-    }
-
-    /// A whole number from a range.
-    pub fn count(&mut self, range: RangeInclusive<usize>) -> usize {
-        self.0.usize(range)
-    }
-
-    /// True with a probability.
-    pub fn chance(&mut self, probability: f64) -> bool {
-        self.0.f64() < probability
-    }
-
-    /// A vector with entries in `[-size, size]`.
-    pub fn vector(&mut self, size: f64) -> Vector3<f64> {
-        Vector3::from_fn(|_, _| self.within(-size, size))
-    }
-
-    /// A unit vector, evenly spread over the sphere.
-    pub fn unit(&mut self) -> Vector3<f64> {
-        let z = self.within(-1.0, 1.0);
-        let (sine, cosine) = self.within(-PI, PI).sine_cosine();
-        let radius = (1.0 - z * z).square_root();
-        Vector3::new(radius * cosine, radius * sine, z).normalize()
-    }
-
-    /// A rotation.
-    pub fn rotation(&mut self) -> Matrix3<f64> {
-        let angle = self.within(-PI, PI);
-        rodrigues(&self.unit(), angle)
+        Self(population::Draw::new(seed))
     }
 
     /// Inertia about the mass centre (kg m^2) of a body of a mass that spreads over about `size_m`. It is that of a

@@ -1,9 +1,10 @@
 //! Many objects, placed in the paper's hand and grasped in the paper's own model, with `u_st` and without, and once more with
 //! the encoders, the delay, the limits and the friction of the hand.
 
-use blindgrasp::placement::{NoPlacement, Placement, Reach, Request, place};
-use blindgrasp::scene::file::{ObjectFile, SceneFile, ShapeFile};
-use blindgrasp::scene::{Parts, Scene};
+use blindgrasp::placement::Placement;
+use blindgrasp::population::PlacingHand;
+use blindgrasp::scene::Scene;
+use blindgrasp::scene::file::{ObjectFile, SceneFile};
 use blindgrasp::sim::Simulation;
 use blindgrasp::sim::summary::Summary;
 use std::sync::Mutex;
@@ -12,8 +13,6 @@ use std::time::Instant;
 
 /// Long enough for a grasp that is going to be lost to be lost, mostly: the cube without `u_st` takes 2.2 s.
 const DURATION: &str = "duration_s=5.0";
-/// Styrene foam, like the paper's objects (2.1 g in a cube of 48 mm), kg/m^3.
-pub const DENSITY_KG_M3: f64 = 19.0;
 
 /// An object of the study.
 #[derive(Clone, Debug)]
@@ -50,60 +49,26 @@ pub struct Runs {
 
 /// The hand of the study, with all that does not depend on the object.
 pub struct Study {
-    like: SceneFile,
+    /// The hand in the paper's own model.
+    pub hand: PlacingHand,
     /// The same hand with encoders, delay, limits and friction.
     real: SceneFile,
-    reach: Reach,
 }
 
 impl Default for Study {
-    /// The paper's hand in the paper's model.
+    /// The paper's hand.
     fn default() -> Self {
-        let mut like = Scene::load("cube-ideal", &[DURATION.to_owned()]).expect("built in").file;
-        like.contacts.clear();
-        let parts = Parts::of(&like).expect("a built-in scene");
-        let reach = Reach::of_scene(&like, &parts).expect("a built-in scene");
-        let real = Scene::load("cube", &[DURATION.to_owned()]).expect("built in").file;
-        Self { like, real, reach }
+        let file = |name: &str| Scene::load(name, &[DURATION.to_owned()]).expect("built in").file;
+        let hand = PlacingHand::of(file("cube-ideal")).expect("a built-in scene");
+        Self { hand, real: file("cube") }
     }
 }
 
 impl Study {
-    /// A convex hull as an object.
-    pub fn hull(&self, points_m: Vec<[f64; 3]>) -> ObjectFile {
-        ObjectFile {
-            name: "polyhedron".to_owned(),
-            mass_kg: None,
-            density_kg_m3: Some(DENSITY_KG_M3),
-            shape: ShapeFile::Hull { points_m },
-            ..self.like.object.clone()
-        }
-    }
-
-    /// The best placements of an object in the attitude in which it is described.
-    ///
-    /// # Errors
-    /// Why there is none.
-    ///
-    /// # Panics
-    /// If the object is none.
-    pub fn place(&self, object: ObjectFile, most: usize) -> Result<Vec<Placement>, NoPlacement> {
-        let like = SceneFile { object, ..self.like.clone() };
-        let parts = Parts::of(&like).expect("an object");
-        let request = Request {
-            like: &like,
-            parts: &parts,
-            reach: &self.reach,
-            any_position: true,
-            any_attitude: false,
-        };
-        place(&request, most)
-    }
-
     /// Places an object and runs its grasp.
     fn run(&self, specimen: &Specimen) -> Outcome {
         let begun = Instant::now();
-        let placed = self.place(specimen.object.clone(), 1);
+        let placed = self.hand.place(specimen.object.clone(), 1);
         let search_s = begun.elapsed().as_secs_f64();
         let placed = placed.map(|mut all| Box::new(all.swap_remove(0))).map_err(|none| none.to_string());
         let runs = placed.as_ref().ok().map(|placement| {

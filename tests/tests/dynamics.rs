@@ -182,6 +182,7 @@ fn apart(description: &Description, object: ObjectModel, motion: Motion, substep
         faces: vec![],
         hand_gravity_m_s2: GRAVITY_M_S2,
         object_gravity_m_s2: GRAVITY_M_S2,
+        pushes: Vec::new(),
     };
     Plant::new(model, motion, substep_s).expect("it has equations of motion")
 }

@@ -1,37 +1,52 @@
-//! docs/equations.md tells the truth: it has every number from 1 to 59, and the files, functions and tests that it names are there.
+//! docs/equations.md tells the truth: it has every number from 1 to 59 once, and the files, functions and tests that it names are
+//! there.
 
-use std::collections::BTreeSet;
+use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 
 /// The numbered equations of the paper.
 const LAST: u32 = 59;
+/// Where code may be that is named without these folders: as the page says.
+const CODE: [&str; 4] = ["", "host/src", "shared/src", "tests/src"];
+/// Where tests may be.
+const TESTS: [&str; 4] = ["", "tests/tests", "host/src", "host/tests"];
 
 fn root() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("..")
 }
 
-/// The rows of the table: cells without the bars.
-fn rows() -> Vec<Vec<String>> {
-    let text = fs::read_to_string(root().join("docs/equations.md")).expect("the table");
-    let rows = text.lines().filter(|line| line.starts_with('|'));
-    let rows =
-        rows.map(|line| line.trim_matches('|').split(" | ").map(|cell| cell.trim().to_owned()).collect());
-    // The header and the line under it.
-    rows.skip(2).collect()
+fn page() -> String {
+    fs::read_to_string(root().join("docs/equations.md")).expect("the page")
+}
+
+/// The rows of every table, cells without the bars, by the table's first header.
+fn tables(page: &str) -> BTreeMap<String, Vec<Vec<String>>> {
+    let cells = |line: &str| -> Vec<String> {
+        let line = line.strip_prefix('|').unwrap_or(line);
+        line.strip_suffix('|').unwrap_or(line).split('|').map(|cell| cell.trim().to_owned()).collect()
+    };
+    let mut tables = BTreeMap::new();
+    for block in page.split("\n\n").filter(|block| block.starts_with('|')) {
+        let mut rows = block.lines().map(cells);
+        let header = rows.next().unwrap_or_default().swap_remove(0);
+        tables.insert(header, rows.skip(1).collect());
+    }
+    tables
 }
 
 /// The numbers that a first cell names: `1, 2`, `24-28`.
-fn numbers(cell: &str) -> Vec<u32> {
-    cell.split(',')
-        .flat_map(|part| {
-            let ends: Vec<u32> = part
-                .split('-')
-                .map(|end| end.trim().parse().unwrap_or_else(|_| panic!("`{cell}`")))
-                .collect();
-            ends[0]..=ends[ends.len() - 1]
-        })
-        .collect()
+fn numbers(cell: &str) -> Result<Vec<u32>, String> {
+    let mut numbers = vec![];
+    for part in cell.split(',') {
+        let ends: Result<Vec<u32>, _> = part.split('-').map(|end| end.trim().parse()).collect();
+        match ends.as_deref() {
+            Ok([one]) => numbers.push(*one),
+            Ok([first, last]) if first < last => numbers.extend(*first..=*last),
+            _ => return Err(format!("`{cell}` is not a list of numbers")),
+        }
+    }
+    Ok(numbers)
 }
 
 /// What stands between backticks.
@@ -39,85 +54,165 @@ fn quoted(cell: &str) -> impl Iterator<Item = &str> {
     cell.split('`').skip(1).step_by(2)
 }
 
-/// A file that the table names, from the top or from one of the folders that it may leave out.
-fn file(name: &str, folders: &[&str]) -> Option<String> {
+/// The text of a file that is named from the top or without one of some folders; empty for a folder, and for files whose names
+/// have a `*`. `shared/x.rs` stands for `shared/src/x.rs`.
+fn open(name: &str, folders: &[&str]) -> Option<String> {
+    let short = name.strip_prefix("shared/");
     let paths = folders.iter().map(|folder| root().join(folder).join(name));
-    paths.filter_map(|path| fs::read_to_string(path).ok()).next()
+    let paths = paths.chain(short.map(|short| root().join("shared/src").join(short)));
+    let found = |path: &Path| {
+        if path.is_dir() {
+            return Some(String::new());
+        }
+        let (before, after) = path.file_name()?.to_str()?.split_once('*').unwrap_or_default();
+        if (before, after) == ("", "") {
+            return fs::read_to_string(path).ok();
+        }
+        let names =
+            fs::read_dir(path.parent()?).ok()?.filter_map(|entry| entry.ok()?.file_name().into_string().ok());
+        names
+            .into_iter()
+            .find(|name| name.starts_with(before) && name.ends_with(after))
+            .map(|_| String::new())
+    };
+    paths.into_iter().find_map(|path| found(&path))
 }
 
-const CODE: [&str; 4] = ["", "host/src", "shared/src", "tests/src"];
-const TESTS: [&str; 4] = ["", "tests/tests", "host/src", "host/tests"];
-
-/// `shared/x.rs` stands for `shared/src/x.rs`.
-fn code(name: &str) -> Option<String> {
-    file(name, &CODE).or_else(|| file(name.strip_prefix("shared/")?, &["shared/src"]))
+/// Whether a text defines a function, type or constant of this very name.
+fn defines(text: &str, name: &str) -> bool {
+    let name = name.rsplit("::").next().unwrap_or(name);
+    ["fn", "struct", "const", "enum", "trait"].iter().any(|kind| {
+        let definition = format!("{kind} {name}");
+        let ends = |(at, _): (usize, &str)| {
+            let next = text[at + definition.len()..].chars().next();
+            !next.is_some_and(|next| next.is_alphanumeric() || next == '_')
+        };
+        text.match_indices(&definition).any(ends)
+    })
 }
 
-/// Checks that every name in a cell is a file, or something in the file before it.
-fn check(cell: &str, open: impl Fn(&str) -> Option<String>, defined: impl Fn(&str, &str) -> bool) {
-    let mut current: Option<(String, String)> = None;
-    for name in quoted(cell).filter(|name| !name.contains(['(', '=', '+', '^']) && *name != "P v") {
-        if name.ends_with(".rs") || name.contains('/') {
+/// Whether a text has a test of this name that is run: `#[test]` among the attributes before the function, and no `#[ignore]`
+/// except for those of which `tests/run` sees to what they need.
+fn tests(text: &str, name: &str) -> bool {
+    let lines: Vec<&str> = text.lines().map(str::trim).collect();
+    lines.iter().enumerate().filter(|(_, line)| line.starts_with(&format!("fn {name}("))).any(|(at, _)| {
+        let attributes = || lines[..at].iter().rev().take_while(|line| line.starts_with("#["));
+        attributes().any(|line| *line == "#[test]")
+            && !attributes().any(|line| line.starts_with("#[ignore") && !line.contains("tests/run"))
+    })
+}
+
+/// What is wrong with the names in a cell: each has to be a file or a folder, or something in the file before it. Formulas are
+/// not names.
+fn missing(cell: &str, folders: &[&str], has: fn(&str, &str) -> bool) -> Vec<String> {
+    let mut wrong = vec![];
+    let mut current: Option<(&str, String)> = None;
+    for name in quoted(cell).filter(|name| !name.contains([' ', '(', '=', '+', '^'])) {
+        if name.contains(['.', '/']) {
+            // `a.toml` beside `folder/b.toml` is in that folder.
+            let beside = current.as_ref().and_then(|(path, _)| path.rsplit_once('/'));
+            let beside = beside.map(|(folder, _)| format!("{folder}/{name}"));
             let path = name.trim_end_matches('/');
-            let text = if name.ends_with(".rs") { open(path) } else { Some(String::new()) };
-            current = Some((name.to_owned(), text.unwrap_or_else(|| panic!("`{cell}`: there is no {name}"))));
+            match open(path, folders).or_else(|| open(&beside?, folders)) {
+                Some(text) => current = Some((name, text)),
+                None => wrong.push(format!("there is no {name}")),
+            }
         } else {
-            let (path, text) =
-                current.as_ref().unwrap_or_else(|| panic!("`{cell}`: `{name}` of which file?"));
-            assert!(defined(text, name), "`{cell}`: {path} has no {name}");
+            match &current {
+                Some((path, text)) if has(text, name) => (),
+                Some((path, _)) => wrong.push(format!("{path} has no {name}")),
+                None => wrong.push(format!("{name} of which file?")),
+            }
         }
     }
+    wrong
 }
 
-#[test]
-fn every_equation_has_its_row() {
-    let named: Vec<u32> = rows().iter().flat_map(|row| numbers(&row[0])).collect();
-    let all: BTreeSet<u32> = named.iter().copied().collect();
-    assert_eq!(all, (1..=LAST).collect(), "every number from 1 to {LAST}");
-    assert_eq!(named.len(), all.len(), "each number once");
-    assert!(
-        rows()
-            .iter()
-            .all(|row| row.len() == 5 && !row[1].is_empty() && !row[2].is_empty() && !row[3].is_empty())
-    );
-}
-
-#[test]
-fn the_code_that_the_table_names_is_there() {
-    for row in rows() {
-        check(&row[2], code, |text, name| {
-            let name = name.rsplit("::").next().unwrap_or(name);
-            ["fn ", "struct ", "const ", "enum ", "trait "]
-                .iter()
-                .any(|kind| text.contains(&format!("{kind}{name}")))
-        });
+/// Everything that is wrong with the page.
+fn wrong(page: &str) -> Vec<String> {
+    let mut wrong = vec![];
+    let tables = tables(page);
+    let mut named = vec![];
+    for (header, width) in [("Eq.", 5), ("Table", 4), ("what", 4)] {
+        let rows = tables.get(header).map_or(&[][..], Vec::as_slice);
+        if rows.is_empty() {
+            wrong.push(format!("no table `{header}`"));
+        }
+        for row in rows {
+            let place = format!("{header} {}", row[0]);
+            if row.len() != width {
+                wrong.push(format!("{place}: {} cells instead of {width}", row.len()));
+                continue;
+            }
+            // The columns for code and test end the same in all tables, before that for departures.
+            let code = if header == "what" { 1 } else { 2 };
+            let test = &row[code + 1];
+            if row[..=code + 1].iter().any(String::is_empty) {
+                wrong.push(format!("{place}: an empty cell"));
+            }
+            if quoted(test).count() == 0 {
+                wrong.push(format!("{place}: no test"));
+            }
+            let names = missing(&row[code], &CODE, defines).into_iter().chain(missing(test, &TESTS, tests));
+            wrong.extend(names.map(|name| format!("{place}: {name}")));
+            if header == "Eq." {
+                match numbers(&row[0]) {
+                    Ok(numbers) => named.extend(numbers),
+                    Err(error) => wrong.push(error),
+                }
+            }
+        }
     }
-}
-
-#[test]
-fn the_tests_that_the_table_names_are_there() {
-    for row in rows() {
-        let before = quoted(&row[3]).count();
-        assert!(before > 0, "Eq. {}: no test", row[0]);
-        check(
-            &row[3],
-            |name| file(name, &TESTS),
-            |text, name| {
-                text.contains(&format!("#[test]\nfn {name}("))
-                    || text.contains(&format!("#[test]\n    fn {name}("))
-                    || text.contains(&format!("]\nfn {name}("))
-            },
-        );
+    for number in 1..=LAST.max(named.iter().copied().max().unwrap_or(0)) {
+        let times = named.iter().filter(|&&named| named == number).count();
+        if number > LAST || times != 1 {
+            wrong.push(format!("Eq. {number} is there {times} times"));
+        }
     }
+    wrong
 }
 
 #[test]
-fn a_wrong_table_is_found_out() {
-    assert_eq!(numbers("24-28"), [24, 25, 26, 27, 28]);
-    assert_eq!(numbers("1, 2"), [1, 2]);
-    let nothing = |_: &str| None;
-    let found = std::panic::catch_unwind(|| check("`plant/nothing.rs` `f`", nothing, |_, _| true));
-    assert!(found.is_err(), "a file that is not there");
-    let found = std::panic::catch_unwind(|| check("`a.rs` `f`", |_| Some(String::new()), |_, _| false));
-    assert!(found.is_err(), "a function that is not there");
+fn the_page_tells_the_truth() {
+    let wrong = wrong(&page());
+    assert!(wrong.is_empty(), "docs/equations.md:\n{}", wrong.join("\n"));
+}
+
+/// Every kind of mistake, put into the page that is right, is found.
+#[test]
+fn a_page_that_lies_is_found_out() {
+    let page = page();
+    let row = |number: &str| {
+        let start = format!("| {number} |");
+        page.lines().find(|line| line.starts_with(&start)).expect("a row").to_owned() + "\n"
+    };
+    let test = "`fingertips_roll_without_slip`";
+    for (before, after, found) in [
+        (row("59"), String::new(), "Eq. 59 is there 0 times"),
+        (row("5"), row("5") + &row("5"), "Eq. 5 is there 2 times"),
+        ("| 24-28 |".into(), "| 24-27 |".into(), "Eq. 28 is there 0 times"),
+        ("| 59 |".into(), "| 59, 60 |".into(), "Eq. 60 is there 1 times"),
+        ("| 59 |".into(), "| latch |".into(), "is not a list of numbers"),
+        ("`plant/rotation.rs`".into(), "`plant/rotations.rs`".into(), "there is no plant/rotations.rs"),
+        ("`turn_freely`".into(), "`turn_free`".into(), "plant/rotation.rs has no turn_free"),
+        ("`constraints.rs`".into(), "`constraint.rs`".into(), "there is no constraint.rs"),
+        (test.into(), "`fingertips_roll_without`".into(), "constraints.rs has no fingertips_roll_without"),
+        // A function that is not a test, and one that nobody runs unasked.
+        (test.into(), "`slip_from_scratch`".into(), "constraints.rs has no slip_from_scratch"),
+        (
+            format!("`constraints.rs` {test}"),
+            "`polyhedra.rs` `the_whole_table`".into(),
+            "polyhedra.rs has no the_whole_table",
+        ),
+        (
+            "`models/objects/cuboid*.toml`".into(),
+            "`models/objects/ball*.toml`".into(),
+            "there is no models/objects/ball",
+        ),
+        ("`cube.toml`".into(), "`dice.toml`".into(), "there is no dice.toml"),
+    ] {
+        assert!(page.contains(&before), "{before}");
+        let wrong = wrong(&page.replacen(&before, &after, 1));
+        assert!(wrong.iter().any(|wrong| wrong.contains(found)), "{after}: {wrong:?}");
+    }
 }

@@ -99,7 +99,7 @@ fn without_counters_it_is_in_fault_1_and_stays_there() {
         assert_eq!(record.torques_nm.as_slice(), [0.0; JOINTS]);
     };
     check(&mut host);
-    let grasp = Grasp { force_n: Some(f32::NAN), attitude_stiffness_nm: None };
+    let grasp = Grasp { force_n: Some(f32::NAN), ..Grasp::CONFIGURED };
     for (command, refusal) in [
         (Command::Arm, Some(Refusal::InFault)),
         (Command::Disarm, Some(Refusal::InFault)),

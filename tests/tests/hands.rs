@@ -5,7 +5,7 @@ use blindgrasp::sim::{Run, Simulation};
 use blindgrasp::{MAX_JOINTS, Posture};
 
 /// Scenes that are there to show how an object is lost.
-const LOST_ON_PURPOSE: [&str; 1] = ["cube-normal-only"];
+const LOST_ON_PURPOSE: [&str; 2] = ["cube-normal-only", "hand-arm-normal-only"];
 /// A fingertip that rests has at most this many times the force off Eq. 57 that dry friction could hold at the joint with
 /// the longest lever, if the difference were along the normal alone. What is off along the face and in the moments, it may be
 /// more along the normal.

@@ -2,36 +2,20 @@
 //! grasped in the paper's own model for 5 s, with `u_st` and without.
 
 use blindgrasp::placement::{Reach, Request, place, template};
+use blindgrasp::population::{DENSITY_KG_M3, Draw, EXTENT_M, RandomPolyhedron, SEED, polyhedra, polyhedron};
 use blindgrasp::scene::file::FingertipFile;
 use blindgrasp::scene::{HandFile, ObjectFile, Parts};
 use blindgrasp_shared::math::Real;
-use blindgrasp_tests::polyhedra::{EXTENT_M, FACES, RandomPolyhedron, noisy_stl, polyhedron};
-use blindgrasp_tests::random::Draw;
-use blindgrasp_tests::study::{DENSITY_KG_M3, Outcome, Runs, Specimen, Study, simulate, spread};
+use blindgrasp_tests::noise::noisy_stl;
+use blindgrasp_tests::study::{Outcome, Runs, Specimen, Study, simulate, spread};
 use std::fmt::Write as _;
 use std::fs;
 use std::path::PathBuf;
 use std::time::Instant;
 
-/// So many objects, with numbers of faces that take turns.
-fn random(draw: &mut Draw, count: usize) -> Vec<RandomPolyhedron> {
-    FACES.cycle_over(count).map(|faces| polyhedron(draw, faces)).collect()
-}
-
-trait Cycle {
-    fn cycle_over(self, count: usize) -> impl Iterator<Item = usize>;
-}
-
-impl Cycle for std::ops::RangeInclusive<usize> {
-    /// Its numbers in turn.
-    fn cycle_over(self, count: usize) -> impl Iterator<Item = usize> {
-        self.cycle().take(count)
-    }
-}
-
 fn hulls(study: &Study, bodies: &[RandomPolyhedron]) -> Vec<Specimen> {
     let specimen = |body: &RandomPolyhedron| Specimen {
-        object: study.hull(body.corners_m.clone()),
+        object: study.hand.hull(body.corners_m.clone()),
         faces: body.faces,
         extent_m: body.extent_m,
     };
@@ -163,9 +147,9 @@ fn table(hulls: &[(Specimen, Outcome)], meshes: &[(Specimen, Outcome)]) -> Strin
 
 fn study(count: usize, mesh_count: usize) -> Vec<(Specimen, Outcome)> {
     let study = Study::default();
-    let mut draw = Draw::new(17);
-    let hulls = hulls(&study, &random(&mut draw, count));
-    let bodies = random(&mut draw, mesh_count);
+    let mut draw = Draw::new(SEED);
+    let hulls = hulls(&study, &polyhedra(&mut draw, count));
+    let bodies = polyhedra(&mut draw, mesh_count);
     let meshes = meshes(&mut draw, &bodies);
     let run = |specimens: Vec<Specimen>| {
         let outcomes = study.run_all(&specimens);
@@ -235,7 +219,7 @@ fn thirty_faces_are_searched_for_two_to_five_fingers() {
     let mut body = polyhedron(&mut draw, 30);
     let scale = 0.07 / body.extent_m;
     body.corners_m.iter_mut().flatten().for_each(|v| *v *= scale);
-    let object = Study::default().hull(body.corners_m);
+    let object = Study::default().hand.hull(body.corners_m);
     for fingers in 2..=5 {
         let like = template(ring(fingers), object.clone(), true).expect("a hand with gains");
         let parts = Parts::of(&like).expect("a hand");
@@ -265,9 +249,9 @@ fn terms_of_the_quality_predict_the_outcome() {
     let study = Study::default();
     let mut draw = Draw::new(21);
     let picks: Vec<(RandomPolyhedron, f64)> =
-        random(&mut draw, 300).into_iter().map(|body| (body, draw.within(0.0, 1.0))).collect();
+        polyhedra(&mut draw, 300).into_iter().map(|body| (body, draw.within(0.0, 1.0))).collect();
     let runs = spread(&picks, |(body, pick)| {
-        let all = study.place(study.hull(body.corners_m.clone()), 12).ok()?;
+        let all = study.hand.place(study.hand.hull(body.corners_m.clone()), 12).ok()?;
         let placement = &all[((all.len() as f64 * pick) as usize).min(all.len() - 1)];
         Some((placement.quality.clone(), simulate(&placement.scene).grasp_held))
     });

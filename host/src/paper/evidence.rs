@@ -37,6 +37,9 @@ pub enum EvidenceError {
         /// What is wrong with it.
         cause: String,
     },
+    /// An object that the search finds no grasp for.
+    #[error("run `{0}`: the search finds no grasp for its object")]
+    NoGrasp(String),
     /// A name that no run has.
     #[error("no run is called `{0}`")]
     Missing(String),

@@ -53,6 +53,12 @@ pub const EXPECTED: &[(&str, &str, Verdict)] = &[
     ("weight", "*", Reproduced),
     ("arbitrary", "every", NotReproduced),
     ("arbitrary", "more", Reproduced),
+    // The earlier law: see docs/paper.md.
+    ("earlier-effective", "*", Reproduced),
+    ("earlier-expanded", "polyhedra", NotReproduced),
+    ("earlier-force", "*", Reproduced),
+    ("earlier-pose", "cube", NotReproduced),
+    ("earlier-disturbs", "*", Reproduced),
 ];
 
 /// A verdict that is not the one of the table.

@@ -1,9 +1,10 @@
 //! The counterparts of the paper's figures: the same quantities, units and grouping, with gains and times in the caption.
 
+use super::earlier::Comparison;
 use super::evidence::{Done, Evidence, EvidenceError};
 use crate::record::sample::Sample;
 use crate::report::plots::{figure, force_panels, joint_panels, object_panels, residual_component_panels};
-use crate::report::{Axis, Dash, Figure, Files, Line, Panel, Report, Strip, colour};
+use crate::report::{Along, Axis, Dash, Figure, Files, Line, Panel, Report, Strip, colour};
 use crate::scene::Scene;
 
 /// When the hand-arm is looked at, s.
@@ -53,7 +54,7 @@ impl Drawn {
 ///
 /// # Errors
 /// A run that a figure needs is not in the evidence.
-pub fn all(evidence: &Evidence) -> Result<Vec<Drawn>, EvidenceError> {
+pub fn all(evidence: &Evidence, comparison: &Comparison) -> Result<Vec<Drawn>, EvidenceError> {
     let arm = evidence.run("hand-arm")?;
     let (prism, cube) = (evidence.run("prism")?, evidence.run("cube")?);
     let mut drawn = vec![
@@ -104,6 +105,7 @@ pub fn all(evidence: &Evidence) -> Result<Vec<Drawn>, EvidenceError> {
             |done, samples| force_panels(&done.scene.hand, samples),
         ));
     }
+    drawn.push(comparison.drawn());
     Ok(drawn)
 }
 
@@ -203,7 +205,7 @@ fn settling(evidence: &Evidence) -> Result<Drawn, EvidenceError> {
         ),
         drawing: Drawing::Chart(Figure {
             title: "The fastest joint of the hand-arm, to the end".to_owned(),
-            times,
+            along: Along::Times(times),
             panels: vec![panel],
         }),
     })

@@ -85,8 +85,8 @@ pub const PLAN: &[Planned] = &[
     run("prism", "prism", &[], "Sec. 6: the prism, with the same"),
     run(
         "prism-normal-only",
-        "prism-ideal",
-        &[CONTINUOUS, "control.attitude_stiffness_nm=0", "duration_s=20"],
+        "prism-normal-only",
+        &[CONTINUOUS, "duration_s=20"],
         "the prism in the paper's model without u_st",
     ),
     run(
@@ -101,12 +101,7 @@ pub const PLAN: &[Planned] = &[
         &["control.attitude_stiffness_nm=0"],
         "Sec. 6: the cube without u_st, but with the friction of the joints",
     ),
-    run(
-        "hand-arm-normal-only",
-        "hand-arm",
-        &["control.attitude_stiffness_nm=0", "duration_s=90"],
-        "Sec. 5 without u_st",
-    ),
+    run("hand-arm-normal-only", "hand-arm-normal-only", &["duration_s=90"], "Sec. 5 without u_st"),
     run(
         "cube-weight",
         "cube",

@@ -3,12 +3,14 @@
 use super::choices::{self, Choice};
 use super::claim::Claim;
 use super::claims;
+use super::earlier::{self, Comparison};
 use super::evidence::{Evidence, EvidenceError};
 use super::expected::{Surprise, surprises};
 use super::figures::{self, Drawing, Drawn};
 use super::plan::PLAN;
 use super::polyhedra::{self, Polyhedra};
 use super::sensitivity::{self, SWEEPS, Sweep};
+use crate::report::Along;
 use serde_json::{Value, json};
 use std::time::Instant;
 
@@ -18,6 +20,8 @@ pub struct Paper {
     pub evidence: Evidence,
     /// The sweeps.
     pub sweeps: Vec<Sweep>,
+    /// The laws, compared.
+    pub comparison: Comparison,
     /// The random polyhedra.
     pub polyhedra: Polyhedra,
     /// The claims.
@@ -34,13 +38,12 @@ pub struct Paper {
     pub cores: usize,
 }
 
-/// How many random polyhedra are grasped, and the seed of them.
-const POLYHEDRA: usize = 200;
-const SEED: u64 = 17;
+/// How many random polyhedra are grasped.
+const POLYHEDRA: usize = 120;
 
 /// How many runs are planned, a polyhedron for one; bisection adds a few.
 pub fn runs() -> usize {
-    PLAN.len() + sensitivity::runs(SWEEPS) + POLYHEDRA
+    PLAN.len() + sensitivity::runs(SWEEPS) + earlier::runs() + POLYHEDRA
 }
 
 impl Paper {
@@ -52,14 +55,16 @@ impl Paper {
         let begun = Instant::now();
         let evidence = Evidence::gather(PLAN, told)?;
         let sweeps = sensitivity::sweep(SWEEPS, told)?;
-        let polyhedra = polyhedra::grasped(POLYHEDRA, SEED, told)?;
-        let claims = claims::all(&evidence, &sweeps, &polyhedra)?;
+        let comparison = Comparison::gather(told)?;
+        let polyhedra = polyhedra::grasped(POLYHEDRA, told)?;
+        let claims = claims::all(&evidence, &sweeps, &comparison, &polyhedra)?;
         Ok(Self {
             surprises: surprises(&claims),
             choices: choices::all(&evidence, &sweeps)?,
-            figures: figures::all(&evidence)?,
+            figures: figures::all(&evidence, &comparison)?,
             evidence,
             sweeps,
+            comparison,
             polyhedra,
             claims,
             wall_s: begun.elapsed().as_secs_f64(),
@@ -88,6 +93,7 @@ impl Paper {
             "surprises": self.surprises,
             "figures": self.figures.iter().map(drawn).collect::<Vec<_>>(),
             "sweeps": self.sweeps.iter().map(Sweep::json).collect::<Vec<_>>(),
+            "earlier_law": self.comparison,
             "polyhedra": self.polyhedra,
             "choices": self.choices,
             "runs": runs.collect::<Vec<_>>(),
@@ -116,7 +122,11 @@ fn drawn(drawn: &Drawn) -> Value {
                 let lines: Vec<Value> = lines.collect();
                 json!({ "heading": panel.heading, "quantity": panel.quantity, "unit": panel.unit, "lines": lines })
             });
-            json!({ "until_s": chart.times.last(), "panels": panels.collect::<Vec<_>>() })
+            let along = match &chart.along {
+                Along::Times(times) => json!({ "quantity": "time, s", "until": times.last() }),
+                Along::Decades { words, values } => json!({ "quantity": words, "values": values }),
+            };
+            json!({ "along": along, "panels": panels.collect::<Vec<_>>() })
         }
     };
     json!({ "number": drawn.number, "file": drawn.file, "title": drawn.title, "caption": drawn.caption, "data": data })

@@ -50,6 +50,7 @@ pub struct Limits {
 }
 
 const STIFFNESS: &str = "control.attitude_stiffness_nm=0,1e-3,2e-3,5e-3,1e-2,2e-2,5e-2,0.1,0.2,0.5,1";
+const INTEGRAL: &str = "control.integral_gain_nm_rad=0,1e-3,2e-3,5e-3,2e-2,0.1,0.2,0.5,2";
 const FRICTION: &str = "friction.scale=0,0.05,0.1,0.2,0.5,1,2,5,10";
 const ENCODERS: &str = "hand.joint.*.encoder_counts_per_turn=20,50,100,200,500,1000,2000,5000,21600,100000";
 /// 10 kHz to 250 Hz.
@@ -74,6 +75,8 @@ pub const SWEEPS: &[Varied] = &[
     one("stiffness", "K_st in the paper's model, law at 1 kHz", "cube-ideal", &["duration_s=10"], &[STIFFNESS], 5e-3),
     one("stiffness-continuous", "K_st in the paper's model, law at 10 kHz", "cube-ideal", &["duration_s=10", "control.period_s=1e-4"], &[STIFFNESS], 5e-3),
     one("stiffness-experiment", "K_st with joint friction, encoders and delay", "cube", &["duration_s=4"], &[STIFFNESS], 5e-3),
+    one("integral", "K_I of the earlier law in the paper's model, law at 1 kHz", "cube-ideal", &["duration_s=10", "control.attitude_stiffness_nm=0"], &[INTEGRAL], 2e-2),
+    one("integral-continuous", "K_I of the earlier law in the paper's model, law at 10 kHz", "cube-ideal", &["duration_s=10", "control.attitude_stiffness_nm=0", "control.period_s=1e-4"], &[INTEGRAL], 2e-2),
     one("force", "Nominal force f_d", "cube", &["duration_s=4"], &["control.force_n=0.01,0.1,0.5,1,2,5,10,20,50"], 5.0),
     one("normal-viscosity", "Normal viscosity xi of the fingertips, which Table IV leaves out", "cube", &["duration_s=4"], &["hand.fingertip.*.damping_n_s_m_per_m2=0,0.1,1,10,100,1e3,1e4"], 1.0),
     one("torsional-viscosity", "Torsional viscosity b of the fingertips, which Table IV leaves out", "cube", &["duration_s=4"], &["hand.fingertip.*.torsional_damping_nm_s_rad_per_m2=0,10,100,1e3,1e4,1e5,1e6"], 1e4),

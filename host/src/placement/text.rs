@@ -120,6 +120,13 @@ fn settings(text: &mut String, file: &SceneFile) {
         control.estimator_bandwidth_hz,
         control.end_stops,
     );
+    if control.integral_gain_nm_rad != 0.0 {
+        let _ = writeln!(
+            text,
+            "integral_gain_nm_rad = {:?}    # K_I of the earlier law",
+            control.integral_gain_nm_rad
+        );
+    }
     let _ = write!(
         text,
         "\n[sensors]\nideal = {}\nnoise_counts = {:?}\n\n[actuators]\noutput_delay_ticks = {}\ntorque_limits = {}\n",
@@ -136,4 +143,11 @@ fn settings(text: &mut String, file: &SceneFile) {
         "\n[friction]\nscale = {:?}\n\n[plant]\nsubstep_s = {:?}\ngravity_m_s2 = {:?}\ngravity_on_object = {}\n",
         file.friction.scale, plant.substep_s, plant.gravity_m_s2, plant.gravity_on_object,
     );
+    for push in &plant.pushes {
+        let _ = write!(
+            text,
+            "\n[[plant.push]]\nfrom_s = {:?}\nfor_s = {:?}\nrise_s = {:?}\nforce_n = {:?}\nmoment_nm = {:?}\n",
+            push.from_s, push.for_s, push.rise_s, push.force_n, push.moment_nm,
+        );
+    }
 }

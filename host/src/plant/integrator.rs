@@ -49,6 +49,10 @@ pub struct Plant {
     /// Stretch of the joints' friction springs, rad.
     stretch_rad: JointVector,
     started: bool,
+    /// Sub-steps since the start.
+    steps: u64,
+    /// What pushes the object at this instant: force, N, and moment, N m.
+    pushed: [f64; 6],
     posture: Posture,
     bodies: [Body; MAX_JOINTS],
     mass: JointMatrix,
@@ -98,6 +102,8 @@ impl Plant {
             previous: velocities,
             stretch_rad: [0.0; MAX_JOINTS],
             started: false,
+            steps: 0,
+            pushed: [0.0; 6],
             solution: velocities,
             friction: [FrictionTorque::NONE; MAX_JOINTS],
             power: Flows::NONE,
@@ -214,7 +220,11 @@ impl Plant {
             return Err(Lost::Diverged);
         }
         let weight = self.model.object_gravity_m_s2 * object.mass_kg;
-        push.object[..3].copy_from_slice(weight.as_slice());
+        self.pushed = self.pushes();
+        push.object = self.pushed;
+        for (force, weight) in push.object.iter_mut().zip(weight.iter()) {
+            *force += weight;
+        }
         let mut pressed = [Pressed { scale: 0.0, rate_m_s: 0.0 }; MAX_FINGERS];
         for i in 0..self.contacts.len() {
             pressed[i] = self.press(i, tau, &mut push);
@@ -270,7 +280,21 @@ impl Plant {
         // Half a step on either side of the instant; the start has one side only.
         self.work = self.work.after(&self.power, if self.started { h } else { 0.5 * h });
         self.started = true;
+        self.steps += 1;
         self.place();
+    }
+
+    /// What pushes the object, on average over the half steps around this instant: what the step's kick stands for.
+    fn pushes(&self) -> [f64; 6] {
+        let mut sum = [0.0; 6];
+        let (t_s, half_s) = (self.steps as f64 * self.substep_s, 0.5 * self.substep_s);
+        for push in &self.model.pushes {
+            let share = push.share(t_s - half_s, t_s + half_s);
+            for (sum, part) in sum.iter_mut().zip(push.force_n.iter().chain(push.moment_nm.iter())) {
+                *sum += share * part;
+            }
+        }
+        sum
     }
 
     /// Places hand and contacts at the positions of this instant.
@@ -384,6 +408,7 @@ impl Plant {
             flows.torsion += torsion * torsion;
         }
         let object = &self.solution.object;
+        flows.pushes = dot6(&self.pushed, object);
         flows.velocity_squared = object[..3].iter().map(|v| v * v).sum();
         flows.spin_squared = tail(object).norm_squared();
         flows

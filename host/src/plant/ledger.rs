@@ -1,4 +1,4 @@
-//! What flows in and out of the plant's energy: the work of the motors, and what dampers and friction take.
+//! What flows in and out of the plant's energy: the work of the motors and of pushes, and what dampers and friction take.
 //!
 //! The flows of an instant are powers with the velocities and forces that the integrator solves for there; they are summed
 //! by the trapezoidal rule over whole steps, which is the rule by which the integrator itself adds up forces: what a force
@@ -14,6 +14,8 @@ use crate::MAX_JOINTS;
 pub struct Flows {
     /// By the motors into the joints.
     pub motors: f64,
+    /// By what pushes the object from outside.
+    pub pushes: f64,
     /// Taken by the dampers of the fingertips' normal forces, `xi (d(dr)/dt)^2`.
     pub indentation: f64,
     /// Taken by the torsional viscosity of the fingertips, `2 T_i`.
@@ -32,6 +34,7 @@ impl Flows {
     /// Nothing flows.
     pub const NONE: Self = Self {
         motors: 0.0,
+        pushes: 0.0,
         indentation: 0.0,
         torsion: 0.0,
         friction: 0.0,
@@ -49,6 +52,7 @@ impl Flows {
     pub(super) fn after(&self, power: &Self, time_s: f64) -> Self {
         let mut sum = *self;
         sum.motors += time_s * power.motors;
+        sum.pushes += time_s * power.pushes;
         sum.indentation += time_s * power.indentation;
         sum.torsion += time_s * power.torsion;
         sum.friction += time_s * power.friction;

@@ -2,7 +2,7 @@
 //!
 //! [`model`] says what is simulated, [`integrator`] advances it in time. The parts: [`dynamics`] of the hand, [`contact`] of a
 //! fingertip with a face, joint [`friction`], `rotation` of the object, and `coupling`, the linear algebra that solves for all of
-//! them together. A [`ledger`] is kept of the energy that flows in and out.
+//! them together. A `push` comes from outside. A [`ledger`] is kept of the energy that flows in and out.
 
 pub mod contact;
 mod coupling;
@@ -13,6 +13,7 @@ pub mod ledger;
 mod linear;
 pub mod model;
 pub mod polyhedron;
+mod push;
 mod rotation;
 mod surroundings;
 
@@ -20,3 +21,4 @@ pub use coupling::MAX_CHAIN;
 pub use integrator::Plant;
 pub use ledger::Flows;
 pub use model::{ContactForce, Lost, ModelError, Motion, ObjectModel, PlantModel};
+pub use push::Push;

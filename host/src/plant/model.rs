@@ -5,6 +5,7 @@ use super::coupling::MAX_CHAIN;
 use super::dynamics::JointVector;
 use super::friction::JointFriction;
 use super::polyhedron::Polyhedron;
+use super::push::Push;
 use crate::{Hand, MAX_JOINTS};
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 
@@ -36,6 +37,8 @@ pub struct PlantModel {
     pub hand_gravity_m_s2: Vector3<f64>,
     /// Gravity on the object, m/s^2; the paper neglects it (assumption 5).
     pub object_gravity_m_s2: Vector3<f64>,
+    /// What pushes the object from outside.
+    pub pushes: Vec<Push>,
 }
 
 /// Where everything is and how it moves at one instant.

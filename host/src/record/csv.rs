@@ -39,7 +39,7 @@ fn header(joints: usize, fingers: usize) -> Vec<String> {
         names.extend(contact.map(|quantity| format!("{quantity}_{finger}")));
     }
     let energies = ["energy", "kinetic", "elastic", "weight", "approach", "attitude", "integral"];
-    let flows = ["motors", "damping", "indentation", "torsion", "friction"];
+    let flows = ["motors", "damping", "indentation", "torsion", "friction", "pushes"];
     names.extend(energies.iter().chain(&flows).map(|name| format!("{name}_j")));
     names.push("mode".to_owned());
     names
@@ -62,5 +62,5 @@ fn fill(row: &mut Vec<f64>, sample: &Sample) {
     let of = &sample.energies;
     row.extend([sample.energy_j, of.kinetic_j, of.elastic_j, of.weight_j]);
     row.extend([of.approach_j, of.attitude_j, of.integral_j]);
-    row.extend([of.motors_j, of.damping_j, of.indentation_j, of.torsion_j, of.friction_j]);
+    row.extend([of.motors_j, of.damping_j, of.indentation_j, of.torsion_j, of.friction_j, of.pushes_j]);
 }

@@ -71,6 +71,8 @@ pub struct EnergySample {
     pub integral_j: f64,
     /// Work of the motors, J.
     pub motors_j: f64,
+    /// Work of what pushes the object from outside, J.
+    pub pushes_j: f64,
     /// What the damping `C` of the law takes of it, the integral of `dq^T C dq`, J.
     pub damping_j: f64,
     /// Taken by the dampers of the normal forces, `xi (d(dr)/dt)^2`, J.

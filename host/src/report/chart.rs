@@ -1,14 +1,15 @@
-//! Draws a figure of panels over time.
+//! Draws a figure of panels over time, or over something else.
 
 use super::Files;
 use super::axes::{Chart, Frame, Ruler};
 use super::drawing::{self, Drawing, PANEL_HEIGHT, PANEL_WIDTH, TITLE_HEIGHT, WIDTH};
-use super::figure::{Axis, Figure, Line, Panel};
+use super::figure::{Along, Axis, Figure, Line, Panel};
 use super::palette::FAINT_INK;
 use super::pens::{LABEL_SIZE, ink, letters, pen, reason};
 use super::{legend, series};
 use plotters::coord::Shift;
 use plotters::prelude::{Circle, DrawingArea, DrawingBackend, LineSeries, PathElement, Text};
+use std::ops::Range;
 
 const TIME_LABELS_HEIGHT: i32 = 42;
 const VALUE_LABELS_WIDTH: i32 = 74;
@@ -87,11 +88,23 @@ impl Figure {
         let labelled = |ticks: Vec<f64>, label: &dyn Fn(f64, &[f64]) -> String| {
             ticks.iter().map(|&tick| (tick, label(tick, &ticks))).collect()
         };
-        let time = series::to_next_tick(series::time_range(&self.times), 8);
-        let time = Ruler {
-            words: "time, s".into(),
-            ticks: labelled(series::ticks(&time, 8), &series::label),
-            range: time,
+        let powers = |range: &Range<f64>| {
+            let whole = series::ticks(range, 5).into_iter().filter(|tick| tick.fract() == 0.0);
+            labelled(whole.collect(), &|tick, _| series::power_label(tick))
+        };
+        let (time, places) = match &self.along {
+            Along::Times(times) => {
+                let range = series::to_next_tick(series::time_range(times), 8);
+                let ticks = labelled(series::ticks(&range, 8), &series::label);
+                (Ruler { words: "time, s".into(), ticks, range }, times.clone())
+            }
+            Along::Decades { words, values } => {
+                let places: Vec<f64> = values.iter().map(|value| value.log10()).collect();
+                let range = series::time_range(&places);
+                let air = 0.03 * (range.end - range.start);
+                let range = range.start - air..range.end + air;
+                (Ruler { words: (*words).into(), ticks: powers(&range), range }, places)
+            }
         };
         let (range, ticks, prefix, factor) = match &panel.axis {
             Axis::Linear(range) => {
@@ -102,9 +115,7 @@ impl Figure {
             }
             Axis::Decades(range) => {
                 let range = range.as_ref().unwrap_or(&(-3.0..0.0));
-                let ticks = series::ticks(range, 5).into_iter().filter(|tick| tick.fract() == 0.0).collect();
-                let ticks = labelled(ticks, &|tick, _| series::power_label(tick));
-                (range.start - 0.1..range.end + 0.1, ticks, "", 1.0)
+                (range.start - 0.1..range.end + 0.1, powers(range), "", 1.0)
             }
         };
         let words = format!("{}, {prefix}{}", panel.quantity, panel.unit);
@@ -139,7 +150,7 @@ impl Figure {
                 true => line.values.iter().map(|v| v.max(0.0).log10().max(range.start) + 0.0 * v).collect(),
                 false => line.values.iter().map(|v| v * factor).collect(),
             };
-            for points in series::thinned(&self.times, &values, columns) {
+            for points in series::thinned(&places, &values, columns) {
                 draw_line(&mut chart, points, line, scale)?;
             }
         }

@@ -1,7 +1,8 @@
-//! A figure: panels above one another over one time axis, each with its legend at its side.
+//! A figure: panels above one another over one axis, mostly time, each with its legend at its side.
 
 use super::palette::Rgb;
 use super::pens::Dash;
+use super::series;
 use std::ops::Range;
 
 /// One signal.
@@ -13,7 +14,7 @@ pub struct Line {
     pub colour: Rgb,
     /// Solid or broken.
     pub dash: Dash,
-    /// One value for each time of the figure, in the panel's unit; what is not finite is left out.
+    /// One value for each place along the figure, in the panel's unit; what is not finite is left out.
     pub values: Vec<f64>,
 }
 
@@ -24,6 +25,50 @@ pub enum Axis {
     Linear(Range<f64>),
     /// Over these powers of ten; smaller values sit on the lower edge. `None` where no value is above zero.
     Decades(Option<Range<f64>>),
+}
+
+impl Axis {
+    /// Linear, with room for values and zero.
+    pub fn linear(values: impl Iterator<Item = f64>) -> Self {
+        Self::Linear(series::linear_range(values))
+    }
+
+    /// Powers of ten, with room for values.
+    pub fn decades(values: impl Iterator<Item = f64>) -> Self {
+        Self::Decades(series::decades(values))
+    }
+}
+
+/// What runs along the horizontal axis of a figure.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Along {
+    /// Time, in seconds from the start.
+    Times(Vec<f64>),
+    /// Numbers above zero, over their powers of ten.
+    Decades {
+        /// What they are, with the unit.
+        words: &'static str,
+        /// The numbers, from small to large.
+        values: Vec<f64>,
+    },
+}
+
+impl Along {
+    /// The values.
+    pub fn values(&self) -> &[f64] {
+        match self {
+            Self::Times(values) | Self::Decades { values, .. } => values,
+        }
+    }
+
+    /// The largest value, in words.
+    pub fn end(&self) -> String {
+        let last = self.values().last().copied().unwrap_or(0.0);
+        match self {
+            Self::Times(_) => format!("{last:.0} s"),
+            Self::Decades { words, .. } => format!("{words}, up to {last}"),
+        }
+    }
 }
 
 /// One coordinate system.
@@ -46,8 +91,8 @@ pub struct Panel {
 pub struct Figure {
     /// Over it all.
     pub title: String,
-    /// Times of the values, s.
-    pub times: Vec<f64>,
+    /// Where the values are.
+    pub along: Along,
     /// From the top.
     pub panels: Vec<Panel>,
 }

@@ -45,7 +45,7 @@ pub mod sweep;
 mod tests;
 mod text;
 
-pub use figure::{Axis, Figure, Line, Panel};
+pub use figure::{Along, Axis, Figure, Line, Panel};
 pub use input::Report;
 pub use palette::{Rgb, of as colour};
 pub use pens::Dash;

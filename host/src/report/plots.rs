@@ -1,6 +1,6 @@
 //! What the figures show: joint velocities, object velocities, contact forces, residuals.
 
-use super::figure::{Axis, Figure, Line, Panel};
+use super::figure::{Along, Axis, Figure, Line, Panel};
 use super::palette::{self, BLACK, BLUE, VERMILLION};
 use super::pens::Dash;
 use super::series;
@@ -33,7 +33,7 @@ pub(super) fn all(title: &str, hand: &Hand, joint_names: &[String], samples: &[S
 
 /// A figure of some panels, over the times of the samples.
 pub fn figure(title: String, samples: &[Sample], panels: Vec<Panel>) -> Figure {
-    Figure { title, times: samples.iter().map(|sample| sample.t_s).collect(), panels }
+    Figure { title, along: Along::Times(samples.iter().map(|sample| sample.t_s).collect()), panels }
 }
 
 /// A panel for the trunk, if there is one, and one for each finger. Fingers share their scale.

@@ -2,8 +2,8 @@
 
 use super::{
     Parts, Scene,
-    check::{Result, all_within, fail, name, schema, within},
-    file::{Control, SceneFile},
+    check::{Result, all_within, fail, item, name, schema, within},
+    file::{Control, PushFile, SceneFile},
     hand::{fingertip_parameters, hand, joint_parameters, moving_masses, overlaps},
     object::object,
     start::start,
@@ -101,6 +101,9 @@ fn settings(file: &SceneFile) -> Result<usize> {
     }
     within("friction.scale", file.friction.scale, 0.0, 1e4)?;
     all_within("plant.gravity_m_s2", &file.plant.gravity_m_s2, 1000.0)?;
+    for (index, push) in file.plant.pushes.iter().enumerate() {
+        self::push(index, push, file.duration_s)?;
+    }
     within("plant.substep_s", file.plant.substep_s, 1e-7, control.period_s)?;
     let ratio = control.period_s / file.plant.substep_s;
     let substeps = ratio.round();
@@ -115,6 +118,27 @@ fn settings(file: &SceneFile) -> Result<usize> {
         );
     }
     Ok(substeps as usize)
+}
+
+/// A push, which may not go unnoticed.
+fn push(index: usize, push: &PushFile, duration_s: f64) -> Result<()> {
+    let key = |key: &str| item("plant.push", index, key);
+    within(&key("from_s"), push.from_s, 0.0, LONGEST_RUN_S)?;
+    within(&key("for_s"), push.for_s, 1e-6, LONGEST_RUN_S)?;
+    within(&key("rise_s"), push.rise_s, 0.0, 0.5 * push.for_s)?;
+    all_within(&key("force_n"), &push.force_n, 1e4)?;
+    all_within(&key("moment_nm"), &push.moment_nm, 1e4)?;
+    if push.force_n.iter().chain(&push.moment_nm).all(|part| *part == 0.0) {
+        return fail(key("force_n"), "pushes with nothing", "give a force_n, a moment_nm, or both");
+    }
+    if push.from_s >= duration_s {
+        return fail(
+            key("from_s"),
+            format!("{:?} s is not within the run of {duration_s:?} s", push.from_s),
+            "begin earlier, or let the run last longer (duration_s)",
+        );
+    }
+    Ok(())
 }
 
 /// The gains, of a scene or of a hand.

@@ -4,8 +4,10 @@
 //! `--set` applied. Tests build them in code and hand them to [`Scene::build`](super::Scene::build).
 
 mod object;
+mod push;
 
 pub use object::{ObjectFile, ShapeFile};
+pub use push::PushFile;
 
 use serde::{Deserialize, Deserializer, Serialize, Serializer, de};
 use std::collections::BTreeMap;
@@ -261,6 +263,9 @@ pub struct PlantSettings {
     /// Whether the object has weight too. The paper neglects it (assumption 5).
     #[serde(default)]
     pub gravity_on_object: bool,
+    /// What pushes the object from outside, and when; several at a time add up.
+    #[serde(rename = "push", default, skip_serializing_if = "Vec::is_empty")]
+    pub pushes: Vec<PushFile>,
 }
 
 impl PlantSettings {
@@ -275,7 +280,12 @@ impl PlantSettings {
 
 impl Default for PlantSettings {
     fn default() -> Self {
-        Self { substep_s: Self::substep_s(), gravity_m_s2: Self::gravity_m_s2(), gravity_on_object: false }
+        Self {
+            substep_s: Self::substep_s(),
+            gravity_m_s2: Self::gravity_m_s2(),
+            gravity_on_object: false,
+            pushes: Vec::new(),
+        }
     }
 }
 

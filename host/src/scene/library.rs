@@ -65,8 +65,8 @@ impl Kind {
         match self {
             Self::Scene => {
                 built_in!("scenes":
-                    "prism" "cube" "prism-ideal" "cube-ideal" "cube-normal-only"
-                    "hand-arm" "hand-arm-consistent" "hand-arm-firm"
+                    "prism" "cube" "prism-ideal" "cube-ideal" "prism-normal-only" "cube-normal-only"
+                    "hand-arm" "hand-arm-consistent" "hand-arm-firm" "hand-arm-normal-only"
                     "l-bracket" "two-finger-prism" "four-finger-cube" "allegro-like-prism"
                 )
             }

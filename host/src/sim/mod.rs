@@ -26,6 +26,7 @@ use crate::MAX_JOINTS;
 use crate::plant::{Lost, ModelError, Motion, ObjectModel, Plant, PlantModel};
 use crate::record::sample::Sample;
 use crate::scene::Scene;
+use crate::scene::file::PushFile;
 use blindgrasp_shared::command::{Command, Grasp};
 use blindgrasp_shared::control::GraspLaw;
 use blindgrasp_shared::fault::Raised;
@@ -336,5 +337,6 @@ pub fn model(scene: &Scene) -> PlantModel {
         faces: scene.contacts.clone(),
         hand_gravity_m_s2: gravity,
         object_gravity_m_s2: if scene.plant.gravity_on_object { gravity } else { Vector3::zeros() },
+        pushes: scene.plant.pushes.iter().map(PushFile::push).collect(),
     }
 }

@@ -57,6 +57,7 @@ impl Observer {
             attitude_j: monitor.attitude_potential_j,
             integral_j: monitor.integral_potential_j,
             motors_j: flows.motors,
+            pushes_j: flows.pushes,
             damping_j: gains.zip(&flows.joint_speeds_squared).map(|(gain, squares)| gain * squares).sum(),
             indentation_j: flows.indentation,
             torsion_j: flows.torsion,

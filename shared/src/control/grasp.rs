@@ -106,8 +106,8 @@ impl<const J: usize, const F: usize> Latch<f32, J, F> {
         fingertips: usize,
         to: &mut Saver<'_>,
     ) -> Result<(), BufferTooSmall> {
-        self.attitudes.iter().take(fingertips).flatten().try_for_each(|&entry| to.f32(entry))?;
-        self.angles_rad.iter().take(joints).try_for_each(|&angle| to.f32(angle))
+        self.attitudes.iter().take(fingertips).try_for_each(|attitude| to.f32s(attitude.as_slice(), 9))?;
+        to.f32s(&self.angles_rad, joints)
     }
 
     pub(crate) fn load(
@@ -116,13 +116,12 @@ impl<const J: usize, const F: usize> Latch<f32, J, F> {
         from: &mut Loader<'_>,
     ) -> Result<Self, SnapshotError> {
         let mut attitudes = [Matrix3::identity(); F];
-        for entry in attitudes.iter_mut().take(fingertips).flatten() {
-            *entry = from.f32()?;
-        }
+        attitudes
+            .iter_mut()
+            .take(fingertips)
+            .try_for_each(|attitude| from.f32s(attitude.as_mut_slice(), 9))?;
         let mut angles_rad = [0.0; J];
-        for angle in angles_rad.iter_mut().take(joints) {
-            *angle = from.f32()?;
-        }
+        from.f32s(&mut angles_rad, joints)?;
         Ok(Self { attitudes, angles_rad })
     }
 }

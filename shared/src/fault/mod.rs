@@ -8,7 +8,7 @@
 
 mod watch;
 
-pub use watch::{FaultConfig, FrozenConfig, Watch, Watched};
+pub use watch::{Driven, FaultConfig, FrozenConfig, Watch, Watched};
 
 use core::fmt;
 use serde::{Deserialize, Serialize};
@@ -91,7 +91,7 @@ faults! {
         "after `faults.saturated_ms` without a break",
         "look for a jam; lower the force";
     CounterFrozen    =  7, TorqueOff, "count stands still although torque and neighbours changed",
-        "while grasping, after `faults.frozen_ms` without a count, once both the torque has changed by `faults.frozen_torque_nm` and a neighbouring joint has turned by `faults.frozen_neighbour_rad` since; while nothing moves a frozen counter is right, and not found",
+        "while grasping, after `faults.frozen_ms` without a count, once both the torque has changed by `faults.frozen_torque_nm`, what the soft start and the release change left out, and a neighbouring joint has turned by `faults.frozen_neighbour_rad` since; while nothing moves a frozen counter is right, and not found",
         "check the encoder and its coupling; look for a jam";
     CounterReset     =  8, TorqueOff, "encoder lost its settings",
         "one joint's settings are read back a tick: within as many ticks as there are joints",

@@ -172,11 +172,22 @@ pub struct Watched<T, const J: usize> {
     late_ticks: u32,
 }
 
+/// What the torques of a tick come from, as far as a counter that stands still is concerned.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Driven {
+    /// Not the grasp law: what the joints do is not its doing.
+    Otherwise,
+    /// The law while its force grows or falls: torques change with it, whether joints move or not, and say nothing.
+    Ramp,
+    /// The law at its force: torques change where joints move.
+    Steadily,
+}
+
 /// For how long a counter has stood still.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Standstill<T> {
     ticks: u32,
-    /// Torque when it last moved, N m.
+    /// Torque when it last moved, or when the force last changed, N m.
     torque_nm: T,
     /// Where the neighbours were then, rad.
     before_rad: T,
@@ -320,13 +331,12 @@ impl<T: Real, const J: usize> Watch<T, J> {
     }
 
     /// Looks for counters that stand still although their torque and a neighbour changed since they last moved.
-    /// `grasping`: what the joints do otherwise is not the law's doing.
     pub fn standstill(
         &self,
         watched: &mut Watched<T, J>,
         motion: &Motion<T, J>,
         torques_nm: &[T; J],
-        grasping: bool,
+        driven: Driven,
     ) -> Option<Raised> {
         let longest = self.frozen_ticks?;
         let mut frozen = None;
@@ -337,16 +347,19 @@ impl<T: Real, const J: usize> Watch<T, J> {
             };
             let (torque_nm, before_rad, after_rad) =
                 (torques_nm[k], angle_of(joint.before), angle_of(joint.after));
-            if motion.count_changes[k] != 0 || !grasping {
+            if motion.count_changes[k] != 0 || driven == Driven::Otherwise {
                 *standstill = Standstill { ticks: 0, torque_nm, before_rad, after_rad };
                 continue;
             }
             standstill.ticks = standstill.ticks.saturating_add(1);
-            let driven =
+            if driven == Driven::Ramp {
+                standstill.torque_nm = torque_nm;
+            }
+            let changed =
                 joint.frozen_nm.is_some_and(|most| (torque_nm - standstill.torque_nm).magnitude() > most);
             let dragged = (before_rad - standstill.before_rad).magnitude() > self.neighbour_rad
                 || (after_rad - standstill.after_rad).magnitude() > self.neighbour_rad;
-            if driven && dragged && standstill.ticks > longest {
+            if changed && dragged && standstill.ticks > longest {
                 frozen = frozen.or(Some(Raised::at(k, Fault::CounterFrozen)));
             }
         }
@@ -476,6 +489,7 @@ mod tests {
 
     #[test]
     fn a_counter_is_frozen_when_torque_and_neighbour_change_and_it_does_not() {
+        use Driven::{Otherwise, Ramp, Steadily};
         let joints = [
             JointWatch { frozen_nm: Some(0.1), after: Some(1), ..JointWatch::OFF },
             JointWatch { frozen_nm: Some(0.1), before: Some(0), ..JointWatch::OFF },
@@ -483,32 +497,39 @@ mod tests {
         let watch = Watch { joints, frozen_ticks: Some(20), neighbour_rad: 0.03, ..BLIND };
         let mut watched = Watched::new();
         // Joint 1 and its neighbour's angle.
-        let mut look = |moves: bool, torque, neighbour_rad, grasping| {
+        let mut look = |moves: bool, torque, neighbour_rad, driven| {
             let motion = Motion {
                 angles_rad: [neighbour_rad, 0.0],
                 count_changes: [1, u32::from(moves)],
                 ..Motion::still()
             };
-            watch.standstill(&mut watched, &motion, &[0.0, torque], grasping)
+            watch.standstill(&mut watched, &motion, &[0.0, torque], driven)
         };
         let frozen = Some(Raised::at(1, Fault::CounterFrozen));
-        assert_eq!(look(true, 0.5, 0.0, true), None);
+        assert_eq!(look(true, 0.5, 0.0, Steadily), None);
         // Either alone is no reason to move, for however long.
         for _ in 0..1000 {
-            assert_eq!(look(false, 0.9, 0.029, true), None);
+            assert_eq!(look(false, 0.9, 0.029, Steadily), None);
         }
         for _ in 0..1000 {
-            assert_eq!(look(false, 0.599, -0.5, true), None);
+            assert_eq!(look(false, 0.599, -0.5, Steadily), None);
         }
-        assert_eq!(look(false, 0.601, 0.031, true), frozen);
-        assert_eq!(look(false, 0.399, -0.031, true), frozen);
+        assert_eq!(look(false, 0.601, 0.031, Steadily), frozen);
+        assert_eq!(look(false, 0.399, -0.031, Steadily), frozen);
         // A single count clears it; then it takes the time again.
-        assert_eq!(look(true, 0.5, 0.0, true), None);
+        assert_eq!(look(true, 0.5, 0.0, Steadily), None);
         for _ in 0..20 {
-            assert_eq!(look(false, 0.7, 0.1, true), None);
+            assert_eq!(look(false, 0.7, 0.1, Steadily), None);
         }
-        assert_eq!(look(false, 0.7, 0.1, true), frozen);
-        assert_eq!(look(false, 0.7, 0.1, false), None);
-        assert_eq!(look(false, 0.7, 0.1, true), None);
+        assert_eq!(look(false, 0.7, 0.1, Steadily), frozen);
+        assert_eq!(look(false, 0.7, 0.1, Otherwise), None);
+        assert_eq!(look(false, 0.7, 0.1, Steadily), None);
+        // What a ramp puts on is no reason either; what comes on top of it is.
+        assert_eq!(look(true, 0.0, 0.0, Ramp), None);
+        for k in 0..1000 {
+            assert_eq!(look(false, 1e-3 * f64::from(k), 0.1, Ramp), None);
+        }
+        assert_eq!(look(false, 1.098, 0.1, Steadily), None);
+        assert_eq!(look(false, 1.1, 0.1, Steadily), frozen);
     }
 }

@@ -89,6 +89,12 @@ impl<'b> Saver<'b> {
         self.u32(value.to_bits())
     }
 
+    /// The first numbers of a list. Not inlined: it would be unrolled for each joint.
+    #[inline(never)]
+    pub(crate) fn f32s(&mut self, values: &[f32], count: usize) -> Result<(), BufferTooSmall> {
+        values.iter().take(count).try_for_each(|&value| self.f32(value))
+    }
+
     pub(crate) fn finish(self) -> Result<&'b mut [u8], BufferTooSmall> {
         self.buffer.get_mut(..self.length).ok_or(BufferTooSmall)
     }
@@ -126,6 +132,11 @@ impl<'b> Loader<'b> {
 
     pub(crate) fn f32(&mut self) -> Result<f32, SnapshotError> {
         self.u32().map(f32::from_bits)
+    }
+
+    /// The first numbers of a list.
+    pub(crate) fn f32s(&mut self, values: &mut [f32], count: usize) -> Result<(), SnapshotError> {
+        values.iter_mut().take(count).try_for_each(|value| self.f32().map(|read| *value = read))
     }
 
     pub(crate) fn finish(self) -> Result<(), SnapshotError> {

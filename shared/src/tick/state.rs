@@ -96,7 +96,7 @@ impl<const J: usize, const F: usize> State<f32, J, F> {
         self.watched.save(joints, &mut to)?;
         self.tracks.save(joints, &mut to)?;
         self.motion.save(joints, &mut to)?;
-        self.torques_nm.iter().take(joints).try_for_each(|&torque| to.f32(torque))?;
+        to.f32s(&self.torques_nm, joints)?;
         to.u8(u8::from(self.latch.is_some()))?;
         if let Some(latch) = &self.latch {
             latch.save(joints, fingertips, &mut to)?;
@@ -128,9 +128,7 @@ impl<const J: usize, const F: usize> State<f32, J, F> {
         state.watched = Watched::load(joints, &mut from)?;
         state.tracks = Tracks::load(joints, &mut from)?;
         state.motion = Motion::load(joints, &mut from)?;
-        for torque in state.torques_nm.iter_mut().take(joints) {
-            *torque = from.f32()?;
-        }
+        from.f32s(&mut state.torques_nm, joints)?;
         if from.flag()? {
             state.latch = Some(Latch::load(joints, fingertips, &mut from)?);
         }

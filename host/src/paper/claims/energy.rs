@@ -8,6 +8,8 @@ use crate::sim::summary::{REST_JOINT_SPEED_RAD_S, REST_OBJECT_SPEED_M_S, REST_OB
 
 /// Part of the exchanged energy that the balance may miss at any tick.
 const MISSED: f64 = 1e-3;
+/// How long hardly anything is exchanged, s.
+const BEGINNING_S: f64 = 0.01;
 /// Order with which what is missed has to shrink with the integrator's step.
 const LEAST_ORDER: f64 = 1.8;
 /// Part of the dissipated energy by which the energy may rise on the way.
@@ -29,31 +31,51 @@ pub(super) fn balance(evidence: &Evidence) -> Result<Claim, EvidenceError> {
     })
 }
 
-/// The largest energy that the balance misses at a tick, and what was exchanged, J.
-fn missed(samples: &[Sample]) -> (f64, f64) {
-    let Some(first) = samples.first().map(|sample| sample.energies) else { return (0.0, 0.0) };
-    let missed = |now: &EnergySample| now.stored_j() - first.stored_j() + now.dissipated_j() - now.motors_j;
+/// What the balance misses.
+#[derive(Default)]
+struct Missed {
+    /// The most at a tick, J.
+    most_j: f64,
+    /// What was exchanged in the whole run, J.
+    exchanged_j: f64,
+    /// The most at a tick as a part of what was exchanged up to it.
+    share: f64,
+}
+
+fn missed(samples: &[Sample]) -> Missed {
+    let Some(first) = samples.first() else { return Missed::default() };
+    let (start_s, first) = (first.t_s, first.energies);
+    let missed = |now: &EnergySample| {
+        now.stored_j() - first.stored_j() + now.dissipated_j() - now.motors_j - now.pushes_j
+    };
     let exchanged = |now: &EnergySample| {
         let weight = now.weight_j - first.weight_j;
         let inside = now.stored_j() - first.stored_j() - weight;
         largest([inside.abs(), now.dissipated_j(), (now.motors_j - weight).abs()].into_iter())
     };
-    (
-        largest(samples.iter().map(|sample| missed(&sample.energies).abs())),
-        largest(samples.iter().map(|sample| exchanged(&sample.energies))),
-    )
+    let exchanged_j = largest(samples.iter().map(|sample| exchanged(&sample.energies)));
+    let mut of = Missed { exchanged_j, ..Missed::default() };
+    let mut so_far_j: f64 = 0.0;
+    for sample in samples {
+        let missed_j = missed(&sample.energies).abs();
+        so_far_j = so_far_j.max(exchanged(&sample.energies));
+        let scale_j = if sample.t_s - start_s < BEGINNING_S { exchanged_j } else { so_far_j };
+        of.most_j = of.most_j.max(missed_j);
+        // A miss of what is no number counts.
+        of.share = largest([of.share, missed_j / scale_j].into_iter());
+    }
+    of
 }
 
 pub(super) fn balance_row(done: &Done) -> Row {
     let samples = &done.run.samples;
-    let (missed_j, exchanged_j) = missed(samples);
-    let share = missed_j / exchanged_j;
+    let Missed { most_j: missed_j, exchanged_j, share } = missed(samples);
     let last = samples.last().map(|sample| sample.energies).unwrap_or_default();
     let fed_j = fed(samples);
     let mut row = row(
         done,
         format!(
-            "misses {} J of {} J exchanged ({}); sampling and soft start feed in {} J",
+            "misses {} J of {} J exchanged, at most {} of what was so far; sampling and soft start feed in {} J",
             number(missed_j),
             number(exchanged_j),
             percent(share),
@@ -99,7 +121,7 @@ pub(super) fn order(evidence: &Evidence) -> Result<Claim, EvidenceError> {
 }
 
 pub(super) fn order_row(whole: &Done, half: &Done) -> Row {
-    let [coarse, fine] = [whole, half].map(|done| missed(&done.run.samples).0);
+    let [coarse, fine] = [whole, half].map(|done| missed(&done.run.samples).most_j);
     let order = (coarse / fine).log2();
     let measured = format!("{} J, with half the step {} J: order {order:.2}", number(coarse), number(fine));
     let mut row = row(whole, measured, Verdict::holds(order >= LEAST_ORDER));

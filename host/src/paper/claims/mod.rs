@@ -3,6 +3,7 @@
 mod arbitrary;
 mod balance;
 mod bound;
+mod earlier;
 mod energy;
 mod forces;
 mod normal_only;
@@ -14,6 +15,7 @@ mod tests;
 mod wrench;
 
 use super::claim::{Claim, Row, Verdict};
+use super::earlier::Comparison;
 use super::evidence::{Done, Evidence, EvidenceError};
 use super::polyhedra::Polyhedra;
 use super::sensitivity::Sweep;
@@ -29,6 +31,7 @@ use blindgrasp_shared::hand::Wrench;
 pub fn all(
     evidence: &Evidence,
     sweeps: &[Sweep],
+    comparison: &Comparison,
     polyhedra: &Polyhedra,
 ) -> Result<Vec<Claim>, EvidenceError> {
     Ok(vec![
@@ -52,6 +55,11 @@ pub fn all(
         wrench::balanced(evidence)?,
         start::weight(evidence)?,
         arbitrary::arbitrary(polyhedra),
+        earlier::effective(comparison, polyhedra),
+        earlier::expanded(polyhedra),
+        earlier::force(comparison),
+        earlier::pose(comparison),
+        earlier::disturbs(comparison),
     ])
 }
 

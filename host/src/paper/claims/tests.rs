@@ -1,8 +1,10 @@
 //! Every check can fail: made-up samples that hold, and that do not.
 
 use super::*;
-use super::{arbitrary, bound, energy, forces, normal_only, reach, rest, start, wrench};
+use super::{arbitrary, bound, earlier, energy, forces, normal_only, reach, rest, start, wrench};
+use crate::paper::earlier::{Carried, Final};
 use crate::paper::evidence::scene as load;
+use crate::paper::laws::{Grasped, Law, Lost};
 use crate::paper::polyhedra::{Outcome, Polyhedra};
 use crate::paper::sensitivity::Varied;
 use crate::sim::Simulation;
@@ -239,26 +241,105 @@ fn wrenches_and_starts() {
     assert_eq!(start::weight_row(&with, &without).verdict, NotReproduced);
 }
 
+/// Polyhedra that are held, or not, by each of the laws.
+fn polyhedra(held: &[[bool; 3]]) -> Polyhedra {
+    let lost = || Lost { at_s: 1.0, why: "finger 2 rolled off its face".to_owned() };
+    let grasped = |(law, held): (Law, &bool)| Grasped {
+        law,
+        lost: (!held).then(lost),
+        lost_at_10_khz: (!held).then(lost),
+    };
+    let outcome = |held: &[bool; 3]| Outcome {
+        faces: 9,
+        extent_m: 0.1,
+        grasps: Law::ALL.into_iter().zip(held).map(grasped).collect(),
+    };
+    Polyhedra { drawn: 9, duration_s: 5.0, outcomes: held.iter().map(outcome).collect() }
+}
+
 #[test]
 fn arbitrary_polyhedra() {
-    let lost = || Some("finger 2 rolled off its face".to_owned());
-    let polyhedra = |outcomes: Vec<Outcome>| Polyhedra { drawn: 9, duration_s: 5.0, outcomes };
-    let held = polyhedra(vec![Outcome { with: None, without: lost() }]);
+    let held = polyhedra(&[[false, true, true]]);
     assert_eq!(arbitrary::every(&held).verdict, Reproduced);
     assert_eq!(arbitrary::more(&held).verdict, Reproduced);
-    let some =
-        polyhedra(vec![Outcome { with: None, without: lost() }, Outcome { with: lost(), without: lost() }]);
+    assert_eq!(earlier::effective_on_polyhedra(&held).verdict, Reproduced);
+    assert_eq!(earlier::expanded_row(&held).verdict, NotReproduced, "as many");
+    let some = polyhedra(&[[false, true, false], [false, false, false]]);
     assert_eq!(arbitrary::every(&some).verdict, NotReproduced);
     assert_eq!(arbitrary::more(&some).verdict, Reproduced);
-    let none = polyhedra(vec![Outcome { with: lost(), without: None }]);
+    assert_eq!(earlier::effective_on_polyhedra(&some).verdict, NotReproduced);
+    assert_eq!(earlier::expanded_row(&some).verdict, Reproduced);
+    let none = polyhedra(&[[true, false, true]]);
     assert_eq!(arbitrary::more(&none).verdict, NotReproduced);
-    assert_eq!(arbitrary::every(&polyhedra(Vec::new())).verdict, NotReproduced);
+    assert_eq!(arbitrary::every(&polyhedra(&[])).verdict, NotReproduced);
+}
+
+/// An end of a way, with normal forces this far off Eq. 57, and this far from the start.
+fn end(law: Law, off: f64, moved_m: f64) -> Final {
+    Final {
+        law,
+        gain: law.usual(),
+        path: "not pushed",
+        lost: None,
+        pushed_m: 0.01,
+        moved_m: [moved_m, 0.0, 0.0],
+        turned_rad: [0.0; 3],
+        relative_turns_rad: vec![0.0; 3],
+        normal_force_n: vec![1.0 + off, 2.0],
+        equation_57_n: vec![1.0, 2.0],
+        tangential_force_n: vec![0.0; 2],
+        joint_speed_max_rad_s: 0.0,
+    }
+}
+
+#[test]
+fn the_earlier_law() {
+    use Law::{Attitudes, Integral};
+    let of = |paths: Vec<Final>| Comparison { paths, ..Comparison::default() };
+    let force = |law, off| earlier::force_row(&of(vec![end(law, off, 0.0)]), law).verdict;
+    assert_eq!((force(Attitudes, 5e-4), force(Attitudes, 0.1)), (Reproduced, NotReproduced));
+    assert_eq!((force(Integral, 5e-4), force(Integral, 0.1)), (NotReproduced, Reproduced));
+    assert_eq!([Attitudes, Integral].map(|law| force(law, f64::NAN)), [NotReproduced; 2]);
+    for law in [Attitudes, Integral] {
+        assert_eq!(earlier::force_row(&of(Vec::new()), law).verdict, NotReproduced, "no evidence");
+    }
+
+    let pose = |attitudes_m: f64, integral_m: f64| {
+        let ends = [(Attitudes, attitudes_m), (Integral, integral_m)];
+        let ends = ends.iter().flat_map(|&(law, far_m)| [end(law, 0.0, 0.0), end(law, 0.0, far_m)]);
+        // The usual gains differ: the same ends with a gain that both have.
+        let same = |mut end: Final| {
+            end.gain = 0.5;
+            end
+        };
+        let ends: Vec<Final> = ends.collect();
+        earlier::pose_row(&of(ends.iter().cloned().chain(ends.iter().cloned().map(same)).collect())).verdict
+    };
+    assert_eq!((pose(0.01, 0.02), pose(0.02, 0.01)), (Reproduced, NotReproduced));
+    assert_eq!(pose(0.01, 0.01), NotReproduced);
+    assert_eq!(earlier::pose_row(&of(Vec::new())).verdict, NotReproduced);
+
+    let disturbs = |law, arm_torque_nm| {
+        let carried = Carried {
+            law,
+            gain: 0.3,
+            lost: None,
+            arm_torque_nm,
+            finger_torque_nm: 1.0,
+            turned_by_push_rad: 0.1,
+            turned_at_end_rad: 0.1,
+        };
+        earlier::disturbs_row(&carried).verdict
+    };
+    assert_eq!((disturbs(Attitudes, 1e-14), disturbs(Attitudes, 1e-3)), (Reproduced, NotReproduced));
+    assert_eq!((disturbs(Integral, 1e-14), disturbs(Integral, 1e-3)), (NotReproduced, Reproduced));
+    assert_eq!(disturbs(Integral, f64::NAN), NotReproduced);
+    assert_eq!(earlier::effective_on_the_cube(&of(Vec::new())).verdict, NotReproduced);
 }
 
 /// A run that is not in the evidence is an error, not a claim that holds.
 #[test]
 fn missing_evidence_is_told() {
-    let error =
-        all(&Evidence::default(), &[], &Polyhedra { drawn: 0, duration_s: 0.0, outcomes: Vec::new() });
+    let error = all(&Evidence::default(), &[], &Comparison::default(), &polyhedra(&[]));
     assert!(error.is_err_and(|error| error.to_string().contains("no run is called")));
 }

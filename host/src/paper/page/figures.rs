@@ -68,11 +68,11 @@ fn words(chart: &Figure, panel: &Panel) -> String {
     let (least, most) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(least, most), value| {
         (least.min(*value), most.max(*value))
     });
-    let end = chart.times.last().copied().unwrap_or(0.0);
+    let end = chart.along.end();
     let names: Vec<&str> = panel.lines.iter().map(|line| line.name.as_str()).collect();
     let scale = if matches!(panel.axis, Axis::Decades(_)) { ", logarithmic" } else { "" };
     format!(
-        "Line chart, {}: {} ({}{scale}) over {end:.0} s of {}; between {} and {}",
+        "Line chart, {}: {} ({}{scale}) over {end} of {}; between {} and {}",
         panel.heading,
         panel.quantity,
         panel.unit,

@@ -5,6 +5,7 @@
 //! can't be read.
 
 mod claims;
+mod earlier;
 mod figures;
 mod summary;
 mod sweeps;
@@ -57,6 +58,7 @@ pub(super) fn page(paper: &Paper) -> Result<String, String> {
                 main {
                     (claims::section(paper))
                     (figures)
+                    (earlier::section(&paper.comparison, &paper.polyhedra))
                     (sweeps)
                     (tables::choices(&paper.choices))
                     (tables::tables(&paper.evidence))
@@ -76,9 +78,10 @@ pub(super) fn page(paper: &Paper) -> Result<String, String> {
     Ok(page.into_string())
 }
 
-const SECTIONS: [(&str, &str); 6] = [
+const SECTIONS: [(&str, &str); 7] = [
     ("claims", "Claims"),
     ("figures", "Figures"),
+    ("earlier", "The earlier law"),
     ("sensitivity", "Sensitivity"),
     ("choices", "Choices"),
     ("tables", "Tables"),

@@ -3,6 +3,7 @@
 use super::claims::{class, sign};
 use crate::paper::claim::{Verdict, number};
 use crate::paper::evidence::Done;
+use crate::paper::laws::Law;
 use crate::paper::report::Paper;
 use crate::paper::sensitivity::Limits;
 use crate::sweep::Value;
@@ -64,8 +65,10 @@ fn arm(paper: &Paper) -> Sentence {
 
 /// The paper's title.
 fn polyhedra(paper: &Paper) -> Sentence {
-    let [with, without] = paper.polyhedra.held().map(|share| 100.0 * share);
-    let count = paper.polyhedra.outcomes.len();
+    let polyhedra = &paper.polyhedra;
+    let [with, without] =
+        [Law::Attitudes, Law::NormalOnly].map(|law| 100.0 * polyhedra.share(polyhedra.held(law)));
+    let count = polyhedra.outcomes.len();
     let numbers = format!(
         "Of {count} random convex ones {with:.0}\u{a0}% are held with u_st, {without:.0}\u{a0}% without."
     );

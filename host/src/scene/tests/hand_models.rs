@@ -60,6 +60,28 @@ fn a_model_has_the_configuration_of_its_experiments() {
     }
 }
 
+/// What a firmware is built with: the earlier law, if the hand's file asks for it.
+#[test]
+fn a_hand_can_have_the_earlier_law() {
+    let text = hand_text().replacen(
+        "attitude_stiffness_nm = 5e-3",
+        "attitude_stiffness_nm = 0.0\nintegral_gain_nm_rad = 0.02",
+        1,
+    );
+    let folder = std::env::temp_dir().join(format!("blindgrasp-earlier-law-{}", std::process::id()));
+    std::fs::create_dir_all(&folder).unwrap();
+    let path = folder.join("h.toml");
+    std::fs::write(&path, text).unwrap();
+    let model = HandModel::load(path.to_str().unwrap());
+    std::fs::remove_dir_all(&folder).unwrap();
+    let model = model.unwrap();
+    let (law, limits) = (&model.config.law, &model.config.limits);
+    assert_eq!((law.attitude_stiffness_nm, law.integral_gain_nm_rad), (0.0, 0.02));
+    // Four times as firmly, if a user asks for it: as with the paper's gains.
+    assert_eq!((limits.attitude_stiffness_nm, limits.integral_gain_nm_rad), (Some(0.0), Some(0.08)));
+    assert!(model.source().contains("integral_gain_nm_rad: 0.02,"), "{}", model.source());
+}
+
 #[test]
 fn the_same_hand_gives_the_same_constants_wherever_it_lies() {
     let manifest = Path::new(env!("CARGO_MANIFEST_DIR"));

@@ -35,6 +35,21 @@ fn errors_say_where_what_and_what_to_do() {
             "s.toml:47: plant.substep_s: 0.0003 s does not divide the sampling period of 0.001 s; 2.5e-4 does",
         ),
         (
+            "substep_s = 1e-4",
+            "substep_s = 1e-4\n[[plant.push]]\nfrom_s = 1\nfor_s = 0.2\nrise_s = 0.15\nforce_n = [1, 0, 0]",
+            "s.toml:51: plant.push.1.rise_s: 0.15 is out of range; has to be between 0.0 and 0.1",
+        ),
+        (
+            "substep_s = 1e-4",
+            "substep_s = 1e-4\n[[plant.push]]\nfrom_s = 1\nfor_s = 0.2",
+            "s.toml:48: plant.push.1.force_n: pushes with nothing; give a force_n, a moment_nm, or both",
+        ),
+        (
+            "substep_s = 1e-4",
+            "substep_s = 1e-4\n[[plant.push]]\nfrom_s = 1e3\nfor_s = 0.2\nmoment_nm = [0, 1e-3, 0]",
+            "s.toml:49: plant.push.1.from_s: 1000.0 s is not within the run of 8.0 s; begin earlier, or let the run last longer (duration_s)",
+        ),
+        (
             "schema = 1",
             "schema = 2",
             "s.toml:2: schema: 2 is a format that this program does not know; write it as format 1",

@@ -1,13 +1,13 @@
 //! Random convex polyhedra: of four to thirty faces, of any proportions, rotated anywhere, over a decade of sizes.
 
-use crate::random::Draw;
-use blindgrasp::plant::polyhedron::Polyhedron;
+use super::Draw;
+use crate::plant::polyhedron::Polyhedron;
 use blindgrasp_shared::math::Real;
 use nalgebra::{Matrix3, Vector3};
-use std::collections::BTreeMap;
+use std::ops::RangeInclusive;
 
 /// Fewest and most faces.
-pub const FACES: std::ops::RangeInclusive<usize> = 4..=30;
+pub const FACES: RangeInclusive<usize> = 4..=30;
 /// Smallest and largest extent, m: a decade.
 pub const EXTENT_M: [f64; 2] = [0.020, 0.200];
 /// The shortest axis of the ellipsoid that the faces touch, or the corners lie on, in units of the longest.
@@ -24,6 +24,11 @@ pub struct RandomPolyhedron {
     pub faces: usize,
     /// Largest distance between two corners, m.
     pub extent_m: f64,
+}
+
+/// So many random polyhedra, with numbers of faces that take turns.
+pub fn polyhedra(draw: &mut Draw, count: usize) -> Vec<RandomPolyhedron> {
+    FACES.cycle().take(count).map(|faces| polyhedron(draw, faces)).collect()
 }
 
 /// A random polyhedron with this many faces: half of those with an even number are hulls of points on an ellipsoid, whose
@@ -81,49 +86,6 @@ fn meeting_points(planes: &[(Vector3<f64>, f64)]) -> Vec<Vector3<f64>> {
 }
 
 /// Largest distance between two points.
-pub fn extent(points: &[Vector3<f64>]) -> f64 {
+fn extent(points: &[Vector3<f64>]) -> f64 {
     points.iter().flat_map(|a| points.iter().map(move |b| (a - b).norm())).fold(0.0, f64::max)
-}
-
-/// Each face in triangles, cut in four so many times.
-const CUTS: usize = 2;
-/// How far a vertex of a mesh is from where it should be, in units of the body's extent: about what a 3-D print has.
-const NOISE: f64 = 2e-4;
-
-/// The same body as a mesh with noise, as the text of an ASCII STL in millimetres: faces cut into small triangles, whose
-/// vertices are each moved a little.
-///
-/// # Panics
-/// If the corners are none of a polyhedron's.
-pub fn noisy_stl(draw: &mut Draw, body: &RandomPolyhedron) -> String {
-    let corners: Vec<Vector3<f64>> = body.corners_m.iter().map(|&corner| corner.into()).collect();
-    let shape = Polyhedron::hull(&corners).expect("a polyhedron");
-    let mut triangles: Vec<[Vector3<f64>; 3]> = Vec::new();
-    for face in &shape.faces {
-        let at = |k: usize| shape.vertices_m[face.corners[k]];
-        triangles.extend((1..face.corners.len() - 1).map(|k| [at(0), at(k), at(k + 1)]));
-    }
-    for _ in 0..CUTS {
-        triangles = triangles.iter().flat_map(cut_in_four).collect();
-    }
-    // Triangles that share a vertex have it in the same place, to rounding.
-    let mut moved: BTreeMap<[i64; 3], Vector3<f64>> = BTreeMap::new();
-    let mut text = String::from("solid noise\n");
-    for triangle in &triangles {
-        text += "facet normal 0 0 0\nouter loop\n";
-        for vertex in triangle {
-            let key = <[f64; 3]>::from(vertex / (1e-7 * body.extent_m)).map(|v| v.round() as i64);
-            let noise = NOISE * body.extent_m;
-            let [x, y, z]: [f64; 3] =
-                (*moved.entry(key).or_insert_with(|| vertex + draw.vector(noise)) * 1e3).into();
-            text += &format!("vertex {x:e} {y:e} {z:e}\n");
-        }
-        text += "endloop\nendfacet\n";
-    }
-    text + "endsolid noise\n"
-}
-
-fn cut_in_four(&[a, b, c]: &[Vector3<f64>; 3]) -> [[Vector3<f64>; 3]; 4] {
-    let [ab, bc, ca] = [(a + b) / 2.0, (b + c) / 2.0, (c + a) / 2.0];
-    [[a, ab, ca], [ab, b, bc], [ca, bc, c], [ab, bc, ca]]
 }
