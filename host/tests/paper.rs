@@ -63,6 +63,33 @@ fn the_paper_is_run_and_checked() {
         let trace = fs::read_to_string(folder.join(format!("traces/{trace}.csv"))).expect("a trace");
         assert!(trace.starts_with("t_s,q_1") && trace.lines().count() > 1000);
     }
+    let sweeps = report["sweeps"].as_array().expect("sweeps");
+    for sweep in sweeps {
+        let name = sweep["name"].as_str().expect("a name");
+        let rows = sweep["rows"].as_array().expect("rows");
+        assert!(rows.iter().all(|row| row["summary"].is_object()), "{name}: nothing is refused");
+        let table = fs::read_to_string(folder.join(format!("sweeps/{name}.csv"))).expect("a table");
+        assert!(table.starts_with("run,") && table.contains(sweep["keys"][0].as_str().expect("a key")));
+        assert!(
+            fs::read(folder.join(format!("sweeps/{name}.png"))).expect("a picture").starts_with(b"\x89PNG")
+        );
+        // The point of failure is as close as it should be, unless there is no whole number between.
+        for edge in [&sweep["fails_below"], &sweep["fails_above"]] {
+            let (Some(held), Some(lost)) = (edge["held"].as_f64(), edge["lost"].as_f64()) else { continue };
+            let apart = (held - lost).abs();
+            assert!(
+                apart <= 0.1 * held.max(lost) * (1.0 + 1e-9) || apart <= 1.0 && held.fract() == 0.0,
+                "{name}: {edge}"
+            );
+        }
+    }
+    // Every quantity is varied, and the grasp fails in most.
+    let keys: BTreeSet<&str> = sweeps.iter().filter_map(|sweep| sweep["keys"][0].as_str()).collect();
+    assert!(keys.len() >= 9, "{keys:?}");
+    let fails = |sweep: &&Value| sweep["fails_below"].is_object() || sweep["fails_above"].is_object();
+    assert!(sweeps.iter().filter(fails).count() >= 8);
+    assert!(sweeps.iter().any(|sweep| sweep["keys"].as_array().is_some_and(|keys| keys.len() == 2)), "a map");
+
     let again: Value =
         serde_json::from_slice(&fs::read(folder.join("claims.json")).expect("claims.json")).expect("JSON");
     assert_eq!(again, report);
@@ -85,6 +112,7 @@ fn page_is_whole(path: &Path) {
     let missing: Vec<&String> = seen.links.difference(&seen.ids).collect();
     assert!(missing.is_empty(), "links to nothing: {missing:?}");
     assert!(seen.tables > 10 && seen.charts > 20 && seen.pictures >= 12, "{seen:?}");
+    assert!(text.len() < 2_500_000, "{} bytes", text.len());
     // In a style sheet, too.
     assert!(!text.contains("@import") && !text.contains("url("));
 }
@@ -132,10 +160,10 @@ impl Seen {
                 _ => {}
             }
         }
-        if let Some(id) = get("id") {
-            if !self.ids.insert(id.to_owned()) {
-                self.problems.push(format!("two are called {id}"));
-            }
+        if let Some(id) = get("id")
+            && !self.ids.insert(id.to_owned())
+        {
+            self.problems.push(format!("two are called {id}"));
         }
         match name {
             "img" => {

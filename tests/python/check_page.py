@@ -1,9 +1,9 @@
 """Opens a page in headless Chromium, at the widths of a telephone, a tablet and a screen, and says what is wrong with it:
 messages on its console, elements that are wider than the window, requests for anything outside the page.
 
-    python3 tests/python/check_page.py paper.html [--screenshots DIR]
+    python3 tests/python/check_page.py paper.html [--screenshots DIR] [--top FILE]
 
-Needs a Chromium (Debian's `chromium`) and Python's standard library. Exit code 0: nothing; 1: something; 3: no Chromium.
+`--screenshots` leaves pictures of the whole page and what it prints as; `--top` one of its top, as the README shows it. Needs a Chromium (Debian's `chromium`) and Python's standard library. Exit code 0: nothing; 1: something; 3: no Chromium.
 """
 
 import json
@@ -15,6 +15,7 @@ import sys
 import tempfile
 
 WIDTHS = [360, 768, 1280]
+TOP = (1100, 860)
 FLAGS = [
     "--headless", "--no-sandbox", "--disable-gpu", "--no-first-run", "--disable-background-networking",
     "--disable-component-update", "--disable-sync", "--hide-scrollbars", "--enable-logging=stderr", "--v=0",
@@ -86,8 +87,15 @@ def main():
         folder = pathlib.Path(sys.argv[sys.argv.index("--screenshots") + 1])
         folder.mkdir(parents=True, exist_ok=True)
         for width in WIDTHS:
-            chromium(browser, f"--window-size={width},3000", f"--screenshot={folder / f'{width}.png'}", page.as_uri())
+            framed = folder / "frame.html"
+            framed.write_text(FRAME.replace('2000"', '12000"').replace("copy.html", page.as_uri()) % width, encoding="utf-8")
+            chromium(browser, f"--window-size={max(width, 800)},12000", f"--screenshot={folder / f'{width}.png'}",
+                     framed.as_uri())
+            framed.unlink()
         chromium(browser, "--no-pdf-header-footer", f"--print-to-pdf={folder / 'print.pdf'}", page.as_uri())
+    if "--top" in sys.argv:
+        picture = pathlib.Path(sys.argv[sys.argv.index("--top") + 1]).resolve()
+        chromium(browser, f"--window-size={TOP[0]},{TOP[1]}", f"--screenshot={picture}", page.as_uri())
     for problem in problems:
         print(problem)
     print(f"{page.name}: {len(problems)} problems at {', '.join(map(str, WIDTHS))} px")

@@ -114,7 +114,7 @@ fn drawn(drawn: &Drawn) -> Value {
                     json!({
                         "name": line.name,
                         "first": finite().next(),
-                        "last": finite().last(),
+                        "last": finite().next_back(),
                         "least": finite().reduce(f64::min),
                         "largest": finite().reduce(f64::max),
                     })

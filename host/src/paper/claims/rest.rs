@@ -153,12 +153,13 @@ pub(super) fn transient(evidence: &Evidence) -> Result<Claim, EvidenceError> {
 
 pub(super) fn transient_row(done: &Done) -> Row {
     let samples = &done.run.samples;
-    let quantities: [(&str, fn(&Sample) -> f64); 3] = [
+    type Quantity = fn(&Sample) -> f64;
+    let quantities: [(&str, Quantity); 3] = [
         ("joints", fastest),
         ("object", |sample| sample.velocity_m_s.norm()),
         ("rotation", |sample| sample.spin_rad_s.norm()),
     ];
-    let quarter = |k: usize, of: fn(&Sample) -> f64| {
+    let quarter = |k: usize, of: Quantity| {
         let (from_s, to_s) = (TRANSIENT_S * k as f64 / 4.0, TRANSIENT_S * (k + 1) as f64 / 4.0);
         largest(samples.iter().filter(|s| s.t_s >= from_s && s.t_s < to_s).map(of))
     };

@@ -124,7 +124,8 @@ fn energy_checks() {
 #[test]
 fn forces_of_the_equilibrium() {
     type Check = fn(&Done) -> Row;
-    let checks: [(Check, fn(&mut Sample)); 4] = [
+    type Spoil = fn(&mut Sample);
+    let checks: [(Check, Spoil); 4] = [
         (forces::residual_row, |sample| sample.contacts[0].force_residual_n.y = 0.2),
         (forces::tangential_row, |sample| sample.contacts[1].moment_residual_nm.x = 0.01),
         (forces::nothing_normal_row, |sample| sample.contacts[2].moment_residual_nm.y = 0.01),

@@ -54,7 +54,7 @@ fn arm(paper: &Paper) -> Sentence {
     let [printed, stiff] = ["hand-arm", "hand-arm-stiff"].map(|name| paper.evidence.run(name).ok());
     let gain = |done: &Done| number(done.scene.control.attitude_stiffness_nm);
     let numbers = format!(
-        "With the printed K_st of {} N m it is {}; with {} N m, {}.",
+        "With the printed K_st of {}\u{a0}N\u{a0}m it is {}; with {}\u{a0}N\u{a0}m, {}.",
         gain(printed?),
         end(printed?),
         gain(stiff?),
@@ -70,8 +70,9 @@ fn polyhedra(paper: &Paper) -> Sentence {
     let [with, without] =
         [Case::PAPER, Case::NORMAL_ONLY].map(|case| 100.0 * polyhedra.share(polyhedra.held(case)));
     let count = polyhedra.outcomes.len();
-    let numbers =
-        format!("Of {count} random convex ones {with:.0} % are held with u_st, {without:.0} % without.");
+    let numbers = format!(
+        "Of {count} random convex ones {with:.0}\u{a0}% are held with u_st, {without:.0}\u{a0}% without."
+    );
     Some((
         Verdict::of(with >= 100.0, with > without),
         "An arbitrary polyhedron is too much said, many more is not.",
@@ -110,7 +111,7 @@ fn friction(paper: &Paper) -> Sentence {
     let Limits { below, .. } = sweep.limits()?;
     let lost = below?.lost;
     let numbers = format!(
-        "At 1 kHz, with encoders and a tick of delay, the cube is lost below {} of what is assumed.",
+        "At 1\u{a0}kHz, with encoders and a tick of delay, the cube is lost below {} of what is assumed.",
         Value::number(lost).text
     );
     Some((Verdict::Differs, "The experiments need friction in the joints.", numbers))
@@ -118,8 +119,8 @@ fn friction(paper: &Paper) -> Sentence {
 
 fn end(done: &Done) -> String {
     match (done.summary().lost_at_s, done.summary().settle_time_s) {
-        (Some(t_s), _) => format!("lost after {t_s:.1} s"),
-        (None, Some(t_s)) => format!("at rest after {t_s:.1} s"),
-        (None, None) => format!("held for {:.0} s", done.summary().duration_s),
+        (Some(t_s), _) => format!("lost after {t_s:.1}\u{a0}s"),
+        (None, Some(t_s)) => format!("at rest after {t_s:.1}\u{a0}s"),
+        (None, None) => format!("held for {:.0}\u{a0}s", done.summary().duration_s),
     }
 }

@@ -240,7 +240,7 @@ fn curves_of_any_size_are_drawn_without_words_over_words() {
         let zero = variable("friction.scale", "", Spread::Logarithmic(numbers), count as usize);
         let places = zero.places();
         assert!(places[1..].windows(2).all(|pair| pair[0] < pair[1]) && places[0] < places[1]);
-        let svg = svg(curve(zero, &"x.o".repeat(count as usize).get(..count as usize).unwrap()).files());
+        let svg = svg(curve(zero, "x.o".repeat(count as usize).get(..count as usize).unwrap()).files());
         assert!(says(&svg, "0"), "{count}");
     }
     // Friction over decades.
