@@ -96,7 +96,9 @@ pub(super) fn expanded_row(polyhedra: &Polyhedra, gain: f64) -> Row {
         Figure::new("held_by_u_st", polyhedra.share(attitudes), ""),
         Figure::new("held_by_u_i", polyhedra.share(integral), ""),
     ];
-    row.remark = "more of either gain holds more, by either law: the difference is less than a factor of two in the gain makes".to_owned();
+    row.remark =
+        "more of either gain holds more, by either law: four times the gain does more than the change of law"
+            .to_owned();
     row
 }
 

@@ -38,7 +38,7 @@ impl Comparison {
             };
             let axis = if quantity.is_wide { Axis::decades(values()) } else { Axis::linear(values()) };
             let panel = |(law, lines): &(Law, Vec<Line>)| Panel {
-                heading: law.words().to_owned(),
+                heading: format!("{}: {}", term(*law), quantity.words),
                 quantity: quantity.words,
                 unit: quantity.unit,
                 axis: axis.clone(),
@@ -81,5 +81,14 @@ impl Comparison {
                 values: GAINS.iter().map(|&gain| value(gain, path.name)).collect(),
             })
             .collect()
+    }
+}
+
+/// What a law has beside `u_s`: its name where there is little room.
+fn term(law: Law) -> &'static str {
+    match law {
+        Law::NormalOnly => "u_s",
+        Attitudes => "u_st",
+        Integral => "u_I",
     }
 }
