@@ -118,7 +118,10 @@ impl Figure {
                 (range.start - 0.1..range.end + 0.1, powers(range), "", 1.0)
             }
         };
-        let words = format!("{}, {prefix}{}", panel.quantity, panel.unit);
+        let words = match panel.unit {
+            "" => panel.quantity.to_owned(),
+            unit => format!("{}, {prefix}{unit}", panel.quantity),
+        };
         let values = Ruler { words, range: range.clone(), ticks };
         let frame = Frame {
             left: VALUE_LABELS_WIDTH,

@@ -78,7 +78,7 @@ pub struct Panel {
     pub heading: String,
     /// What is drawn: the axis label without the unit.
     pub quantity: &'static str,
-    /// SI unit without prefix.
+    /// SI unit without prefix; empty for a pure number.
     pub unit: &'static str,
     /// Its vertical axis.
     pub axis: Axis,

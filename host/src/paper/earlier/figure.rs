@@ -24,7 +24,7 @@ const QUANTITIES: [Quantity; 4] = [
         of: |end| end.normal_force_n.first().copied().unwrap_or(f64::NAN),
         is_wide: false,
     },
-    Quantity { words: "off Eq. 57", unit: "1", of: Final::off_equation_57, is_wide: true },
+    Quantity { words: "share off Eq. 57", unit: "", of: Final::off_equation_57, is_wide: true },
 ];
 
 impl Comparison {

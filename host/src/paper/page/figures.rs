@@ -70,12 +70,14 @@ fn words(chart: &Figure, panel: &Panel) -> String {
     });
     let end = chart.along.end();
     let names: Vec<&str> = panel.lines.iter().map(|line| line.name.as_str()).collect();
-    let scale = if matches!(panel.axis, Axis::Decades(_)) { ", logarithmic" } else { "" };
+    let scale = if matches!(panel.axis, Axis::Decades(_)) { "logarithmic" } else { "" };
+    let unit =
+        [panel.unit, scale].into_iter().filter(|words| !words.is_empty()).collect::<Vec<_>>().join(", ");
+    let unit = if unit.is_empty() { unit } else { format!(" ({unit})") };
     format!(
-        "Line chart, {}: {} ({}{scale}) over {end} of {}; between {} and {}",
+        "Line chart, {}: {}{unit} over {end} of {}; between {} and {}",
         panel.heading,
         panel.quantity,
-        panel.unit,
         names.join(", "),
         crate::paper::claim::number(least),
         crate::paper::claim::number(most)
