@@ -67,7 +67,7 @@ pub struct Page {
     pub record: Record<f32, MAX_JOINTS>,
 }
 
-/// A scene's grasp with its encoders and its output delay, tick by tick, as [`sim`](blindgrasp::sim) runs it.
+/// A scene's grasp with its encoders and its output delay, tick by tick, as [`sim`] runs it.
 ///
 /// # Panics
 /// If the scene can't be simulated, has no encoders or a delay of more than a tick, or loses its grasp.
