@@ -33,8 +33,9 @@ const FROZEN_SHARE: f64 = 0.05;
 /// ... and a neighbour turned by this, rad. Left alone, a grasp does not come near it: neighbours of joints that really
 /// stood still turned by 0.011 rad at most. But somebody who pushes a fingertip of the cube or the prism by 0.25 to 2 N
 /// bends the fingers so that a knee, whose angle is at its extremum, stands still while its neighbours turn by a tenth of a
-/// radian and more. Of 155 such pushes that the grasp survives, these two numbers mistake 2 for a frozen counter; a share
-/// of 0.02 and 0.03 rad mistook one in four or five, and found fewer of the counters that really were frozen.
+/// radian and more. Of 72 such pushes that the grasp survives, these two numbers mistake none for a frozen counter
+/// (`tests/tests/faults.rs`); a share of 0.02 and 0.03 rad mistook one in four or five, and found fewer of the counters that
+/// really were frozen.
 const FROZEN_NEIGHBOUR_RAD: f64 = 0.1;
 /// What the joints do in a second beyond the law's potentials is at most the work of all torque limits over this angle, rad:
 /// 50 mJ for the three-fingered hand, what a stretched finger has at 9 rad/s. Hands that hold, pushed ones included, stay
