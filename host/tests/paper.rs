@@ -190,4 +190,10 @@ impl Seen {
 fn bad_usage_is_told() {
     assert_eq!(blindgrasp(&["paper", "--force"]).status.code(), Some(2), "--force is for --out");
     assert_eq!(blindgrasp(&["paper", "nonsense"]).status.code(), Some(2));
+    // A file where a directory has to be: told at once, and not after minutes of runs.
+    let file = Path::new(env!("CARGO_TARGET_TMPDIR")).join("paper-blocked");
+    fs::write(&file, "").expect("a file");
+    let refused = blindgrasp(&["paper", "--out", file.join("report").to_str().expect("a path")]);
+    assert_eq!((refused.status.code(), refused.stdout.as_slice()), (Some(2), &[][..]));
+    assert!(String::from_utf8_lossy(&refused.stderr).contains("paper-blocked"));
 }

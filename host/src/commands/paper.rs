@@ -32,6 +32,10 @@ pub(crate) struct Arguments {
 /// Runs the command.
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
     let directory = arguments.out.as_ref().map(|path| RunDir::choose(path, arguments.force)).transpose()?;
+    if let Some(directory) = &directory {
+        // Now, and not after minutes of runs.
+        directory.create()?;
+    }
     let bar = ProgressBar::new(report::runs() as u64);
     let style = "{bar:40} {pos} of {len} runs in {elapsed}  {msg}";
     bar.set_style(ProgressStyle::with_template(style).unwrap_or_else(|_| ProgressStyle::default_bar()));
