@@ -1,6 +1,6 @@
 //! A figure: panels above one another over one axis, mostly time, each with its legend at its side.
 
-use super::palette::Rgb;
+use super::palette::{self, Rgb};
 use super::pens::Dash;
 use super::series;
 use std::ops::Range;
@@ -16,6 +16,13 @@ pub struct Line {
     pub dash: Dash,
     /// One value for each place along the figure, in the panel's unit; what is not finite is left out.
     pub values: Vec<f64>,
+}
+
+impl Line {
+    /// The one after so many others of its panel: which says its colour, and whether it is broken.
+    pub fn nth(k: usize, name: impl Into<String>, values: Vec<f64>) -> Self {
+        Self { name: name.into(), colour: palette::of(k), dash: Dash::of(k), values }
+    }
 }
 
 /// How values are laid out along the vertical axis.

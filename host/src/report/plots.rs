@@ -1,7 +1,7 @@
 //! What the figures show: joint velocities, object velocities, contact forces, residuals.
 
 use super::figure::{Along, Axis, Figure, Line, Panel};
-use super::palette::{self, BLACK, BLUE, VERMILLION};
+use super::palette::{BLACK, BLUE, VERMILLION};
 use super::pens::Dash;
 use super::series;
 use crate::Hand;
@@ -60,14 +60,10 @@ pub fn joint_panels(hand: &Hand, names: &[String], samples: &[Sample]) -> Vec<Pa
         lines: joints
             .into_iter()
             .enumerate()
-            .map(|(order, joint)| Line {
-                name: names.get(joint).cloned().unwrap_or_else(|| format!("joint {}", joint + 1)),
-                colour: palette::of(order),
-                dash: Dash::of(order),
-                values: samples
-                    .iter()
-                    .map(|s| s.speeds_rad_s.get(joint).copied().unwrap_or(f64::NAN))
-                    .collect(),
+            .map(|(order, joint)| {
+                let name = names.get(joint).cloned().unwrap_or_else(|| format!("joint {}", joint + 1));
+                let speed = |s: &Sample| s.speeds_rad_s.get(joint).copied().unwrap_or(f64::NAN);
+                Line::nth(order, name, samples.iter().map(speed).collect())
             })
             .collect(),
     };
@@ -86,12 +82,7 @@ pub fn object_panels(samples: &[Sample]) -> Vec<Panel> {
         lines: ["x", "y", "z"]
             .into_iter()
             .enumerate()
-            .map(|(k, name)| Line {
-                name: name.to_owned(),
-                colour: palette::of(k),
-                dash: Dash::of(k),
-                values: samples.iter().map(|s| of(s)[k]).collect(),
-            })
+            .map(|(k, name)| Line::nth(k, name, samples.iter().map(|s| of(s)[k]).collect()))
             .collect(),
     };
     vec![
@@ -145,11 +136,8 @@ fn residual_panels(hand: &Hand, samples: &[Sample]) -> Vec<Panel> {
         unit,
         axis: Axis::Decades(series::decades(samples.iter().flat_map(|s| s.contacts.iter().map(of)))),
         lines: (0..hand.fingertip_count())
-            .map(|finger| Line {
-                name: format!("finger {}", finger + 1),
-                colour: palette::of(finger),
-                dash: Dash::of(finger),
-                values: of_contact(samples, finger, of),
+            .map(|finger| {
+                Line::nth(finger, format!("finger {}", finger + 1), of_contact(samples, finger, of))
             })
             .collect(),
     };
@@ -173,12 +161,7 @@ pub fn residual_component_panels(hand: &Hand, samples: &[Sample]) -> Vec<Panel> 
             lines: ["X, along the face", "Y, normal", "Z, along the face"]
                 .into_iter()
                 .enumerate()
-                .map(|(k, name)| Line {
-                    name: name.to_owned(),
-                    colour: palette::of(k),
-                    dash: Dash::of(k),
-                    values: of_contact(samples, finger, |c| of(c)[k]),
-                })
+                .map(|(k, name)| Line::nth(k, name, of_contact(samples, finger, |c| of(c)[k])))
                 .collect(),
         });
         panels.collect::<Vec<_>>()

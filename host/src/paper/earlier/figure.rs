@@ -3,7 +3,7 @@
 use super::{Comparison, Final, GAINS, PATHS};
 use crate::paper::figures::{Drawing, Drawn};
 use crate::paper::laws::Law::{self, Attitudes, Integral};
-use crate::report::{Along, Axis, Dash, Figure, Line, Panel, colour};
+use crate::report::{Along, Axis, Figure, Line, Panel};
 
 const TITLE: &str = "Where the cube comes to rest, and with which force, by the way it took";
 
@@ -74,11 +74,8 @@ impl Comparison {
         PATHS
             .iter()
             .enumerate()
-            .map(|(k, path)| Line {
-                name: path.name.to_owned(),
-                colour: colour(k),
-                dash: Dash::of(k),
-                values: GAINS.iter().map(|&gain| value(gain, path.name)).collect(),
+            .map(|(k, path)| {
+                Line::nth(k, path.name, GAINS.iter().map(|&gain| value(gain, path.name)).collect())
             })
             .collect()
     }
