@@ -30,7 +30,7 @@ use cortex_m::peripheral::SYST;
 use cortex_m::peripheral::syst::SystClkSource;
 use heapless::String;
 
-type HandParams = Params<f32, JOINTS, FINGERS>;
+type HandParams = Params<JOINTS, FINGERS>;
 
 /// Ticks that are measured, after the grasp has its full force.
 const TICKS: usize = 200;

@@ -15,7 +15,7 @@ mod constants {
 ///
 /// # Panics
 /// Never: the build checked the same numbers.
-pub fn params() -> Params<f32, JOINTS, FINGERS> {
+pub fn params() -> Params<JOINTS, FINGERS> {
     match Params::new(HAND.clone(), &CONFIG) {
         Ok(params) => params,
         Err(_) => unreachable!("the build has checked them"),

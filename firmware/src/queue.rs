@@ -18,7 +18,7 @@ pub type HandReply = Reply<'static, JOINTS>;
 /// What the hand tells by itself.
 pub enum Telemetry {
     /// What a tick did, and what of it is to be sent.
-    Record(Record<f32, JOINTS>, Signals),
+    Record(Record<JOINTS>, Signals),
     /// A part of a snapshot.
     Part(Part),
 }

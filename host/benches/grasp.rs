@@ -95,7 +95,7 @@ fn controller(criterion: &mut Criterion) {
 }
 
 /// The dense form of records that follow one another, and what is made of it again.
-fn dense(criterion: &mut Criterion, record: &Record<f32, J>) {
+fn dense(criterion: &mut Criterion, record: &Record<J>) {
     let mut buffer = [0; 512];
     let mut sender = Sender::new();
     // A full one first: what is dense goes on from it. Then as many as go out before the next full one.

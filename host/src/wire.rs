@@ -13,7 +13,7 @@ pub type Request = message::Request<MAX_JOINTS>;
 /// The joints of a tick.
 pub type Sample = message::Sample<MAX_JOINTS>;
 /// What a tick did.
-pub type Record = telemetry::Record<f32, MAX_JOINTS>;
+pub type Record = telemetry::Record<MAX_JOINTS>;
 
 /// What a firmware says of itself.
 #[derive(Clone, Debug, PartialEq)]

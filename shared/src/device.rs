@@ -45,7 +45,7 @@ pub struct Outputs<const J: usize> {
     /// Torques of the next tick, N m.
     pub torques_nm: [f32; J],
     /// What the tick did.
-    pub record: Record<f32, J>,
+    pub record: Record<J>,
     /// Whether the record is to be sent, and what of it.
     pub telemetry: Option<Signals>,
     /// The answer to the request.
@@ -57,8 +57,8 @@ pub struct Outputs<const J: usize> {
 /// A hand's controller with its link.
 #[derive(Clone, Debug)]
 pub struct Device<const J: usize, const F: usize> {
-    params: Params<f32, J, F>,
-    state: State<f32, J, F>,
+    params: Params<J, F>,
+    state: State<J, F>,
     identity: Identity<'static>,
     session: Session,
     telemetry: Telemetry,
@@ -67,7 +67,7 @@ pub struct Device<const J: usize, const F: usize> {
 
 impl<const J: usize, const F: usize> Device<J, F> {
     /// Disarmed, silent, and nobody has said hello.
-    pub fn new(params: Params<f32, J, F>, identity: Identity<'static>) -> Self {
+    pub fn new(params: Params<J, F>, identity: Identity<'static>) -> Self {
         Self {
             params,
             state: State::new(),
@@ -79,12 +79,12 @@ impl<const J: usize, const F: usize> Device<J, F> {
     }
 
     /// The parameters.
-    pub fn params(&self) -> &Params<f32, J, F> {
+    pub fn params(&self) -> &Params<J, F> {
         &self.params
     }
 
     /// What the tick remembers.
-    pub fn state(&self) -> &State<f32, J, F> {
+    pub fn state(&self) -> &State<J, F> {
         &self.state
     }
 

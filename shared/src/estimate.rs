@@ -49,104 +49,101 @@ use crate::telemetry::snapshot::{Loader, Saver, SnapshotError};
 
 /// How the counts of one joint are read.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Encoder<T> {
+pub struct Encoder {
     /// The count at joint angle zero.
     pub zero_count: i32,
     /// Joint angle of one count, rad; positive.
-    pub rad_per_count: T,
+    pub rad_per_count: f32,
     /// Whether the joint angle falls while the count rises.
     pub reversed: bool,
 }
 
 /// Encoders and filter, as a user gives them.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct EstimatorConfig<T, const J: usize> {
+pub struct EstimatorConfig<const J: usize> {
     /// Bandwidth `f` of the filter, Hz: a speed that swings at this frequency is reported at about half its size. 100 Hz suits 0.0167 degree counts.
-    pub bandwidth_hz: T,
+    pub bandwidth_hz: f32,
     /// One a joint.
-    pub encoders: [Encoder<T>; J],
+    pub encoders: [Encoder; J],
 }
 
-impl<T: Real, const J: usize> EstimatorConfig<T, J> {
+impl<const J: usize> EstimatorConfig<J> {
     /// Checks the parameters and prepares the estimator.
     ///
     /// # Errors
     /// The first parameter that is out of its range.
-    pub fn prepare(&self, joint_count: usize, period: Period) -> Result<Estimator<T, J>, ParameterError> {
+    pub fn prepare(&self, joint_count: usize, period: Period) -> Result<Estimator<J>, ParameterError> {
         let fail = |parameter, joint, reason| Err(ParameterError { parameter, joint, reason });
-        let period_s: T = period.seconds();
-        let w = T::from_f64(core::f64::consts::PI) * self.bandwidth_hz * period_s;
-        if !(w >= T::from_f64(1e-3) && w <= T::one()) {
+        let period_s: f32 = period.seconds();
+        let w = core::f32::consts::PI * self.bandwidth_hz * period_s;
+        if !(1e-3..=1.0).contains(&w) {
             let reason =
                 "times pi times the tick period has to be from 0.001 to 1 (0.32 Hz to 318 Hz at 1 kHz)";
             return fail("estimator.bandwidth_hz", None, reason);
         }
-        let mut scales = [Scale { zero_count: 0, rad: T::zero(), rad_s: T::zero() }; J];
+        let mut scales = [Scale { zero_count: 0, rad: 0.0, rad_s: 0.0 }; J];
         for (k, (scale, encoder)) in scales.iter_mut().zip(&self.encoders).take(joint_count).enumerate() {
             let rad = encoder.rad_per_count;
-            if !(rad > T::zero() && rad <= T::one()) {
+            if !(rad > 0.0 && rad <= 1.0) {
                 return fail("estimator.rad_per_count", Some(k), "has to be positive and at most 1");
             }
             let rad = if encoder.reversed { -rad } else { rad };
             *scale = Scale { zero_count: encoder.zero_count, rad, rad_s: rad / period_s };
         }
-        let pole = (T::one() - w) / (T::one() + w);
-        let rest = T::one() - pole;
-        Ok(Estimator { joint_count, n: T::one() / w, keep: pole * pole, beta: rest * rest, period_s, scales })
+        let pole = (1.0 - w) / (1.0 + w);
+        let rest = 1.0 - pole;
+        Ok(Estimator { joint_count, n: 1.0 / w, keep: pole * pole, beta: rest * rest, period_s, scales })
     }
 }
 
 /// The encoder of one joint, prepared.
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct Scale<T> {
+struct Scale {
     zero_count: i32,
     /// Angle of one count with its sign, rad.
-    rad: T,
+    rad: f32,
     /// Speed of one count a tick with its sign, rad/s.
-    rad_s: T,
+    rad_s: f32,
 }
 
 /// The filter, prepared for the joints of one hand.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Estimator<T, const J: usize> {
+pub struct Estimator<const J: usize> {
     joint_count: usize,
     /// `1 / (pi f T)`, at least 1.
-    n: T,
+    n: f32,
     /// `t^2`: how much of the prediction's error is kept in the angle.
-    keep: T,
+    keep: f32,
     /// `(1 - t)^2`.
-    beta: T,
-    period_s: T,
-    scales: [Scale<T>; J],
+    beta: f32,
+    period_s: f32,
+    scales: [Scale; J],
 }
 
 /// What the filter remembers of one joint.
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct Track<T> {
+struct Track {
     /// The newest count.
     count: i32,
     /// Where the joint is believed to be, ahead of the newest count, counts: between -1/2 and 1/2.
-    play: T,
+    play: f32,
     /// Estimated angle ahead of the newest count, counts.
-    ahead: T,
+    ahead: f32,
     /// Estimated speed, counts a tick.
-    speed: T,
+    speed: f32,
 }
 
 /// What the filter remembers from tick to tick; the first sample starts it, at rest.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Tracks<T, const J: usize> {
+pub struct Tracks<const J: usize> {
     started: bool,
-    tracks: [Track<T>; J],
+    tracks: [Track; J],
 }
 
-impl<T: Real, const J: usize> Tracks<T, J> {
+impl<const J: usize> Tracks<J> {
     /// Waits for the first sample.
     pub fn new() -> Self {
-        Self {
-            started: false,
-            tracks: [Track { count: 0, play: T::zero(), ahead: T::zero(), speed: T::zero() }; J],
-        }
+        Self { started: false, tracks: [Track { count: 0, play: 0.0, ahead: 0.0, speed: 0.0 }; J] }
     }
 
     /// Forgets everything: the next sample counts as the first.
@@ -155,7 +152,7 @@ impl<T: Real, const J: usize> Tracks<T, J> {
     }
 }
 
-impl<const J: usize> Tracks<f32, J> {
+impl<const J: usize> Tracks<J> {
     pub(crate) fn save(&self, joints: usize, to: &mut Saver<'_>) -> Result<(), BufferTooSmall> {
         to.u8(u8::from(self.started))?;
         for track in self.tracks.iter().take(joints) {
@@ -180,7 +177,7 @@ impl<const J: usize> Tracks<f32, J> {
     }
 }
 
-impl<T: Real, const J: usize> Default for Tracks<T, J> {
+impl<const J: usize> Default for Tracks<J> {
     fn default() -> Self {
         Self::new()
     }
@@ -188,30 +185,25 @@ impl<T: Real, const J: usize> Default for Tracks<T, J> {
 
 /// How the joints move; zero beyond the hand's joints.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Motion<T, const J: usize> {
+pub struct Motion<const J: usize> {
     /// Joint angles `q`, rad.
-    pub angles_rad: [T; J],
+    pub angles_rad: [f32; J],
     /// Joint speeds `dq/dt`, rad/s.
-    pub speeds_rad_s: [T; J],
+    pub speeds_rad_s: [f32; J],
     /// By how much each joint turned in this tick, rad, as the counts themselves have it: not late, and in whole counts.
-    pub moved_rad: [T; J],
+    pub moved_rad: [f32; J],
     /// By how many counts each encoder moved in this tick, up or down: a large number means that it miscounts.
     pub count_changes: [u32; J],
 }
 
-impl<T: Real, const J: usize> Motion<T, J> {
+impl<const J: usize> Motion<J> {
     /// At rest at zero.
     pub fn still() -> Self {
-        Self {
-            angles_rad: [T::zero(); J],
-            speeds_rad_s: [T::zero(); J],
-            moved_rad: [T::zero(); J],
-            count_changes: [0; J],
-        }
+        Self { angles_rad: [0.0; J], speeds_rad_s: [0.0; J], moved_rad: [0.0; J], count_changes: [0; J] }
     }
 }
 
-impl<const J: usize> Motion<f32, J> {
+impl<const J: usize> Motion<J> {
     /// Without what has changed in the tick: that says something of its own tick only.
     pub(crate) fn save(&self, joints: usize, to: &mut Saver<'_>) -> Result<(), BufferTooSmall> {
         for (&angle_rad, &speed_rad_s) in self.angles_rad.iter().zip(&self.speeds_rad_s).take(joints) {
@@ -232,62 +224,62 @@ impl<const J: usize> Motion<f32, J> {
     }
 }
 
-impl<T: Real, const J: usize> Estimator<T, J> {
+impl<const J: usize> Estimator<J> {
     /// Takes the counts of this tick.
-    pub fn update(&self, tracks: &mut Tracks<T, J>, counts: &[i32; J]) -> Motion<T, J> {
+    pub fn update(&self, tracks: &mut Tracks<J>, counts: &[i32; J]) -> Motion<J> {
         if !tracks.started {
             tracks.started = true;
             for (track, &count) in tracks.tracks.iter_mut().zip(counts) {
-                *track = Track { count, play: T::zero(), ahead: T::zero(), speed: T::zero() };
+                *track = Track { count, play: 0.0, ahead: 0.0, speed: 0.0 };
             }
         }
         let mut motion = Motion::still();
         for k in 0..self.joint_count.min(J) {
             let (scale, track) = (&self.scales[k], &mut tracks.tracks[k]);
             let moved = track.follow(self.keep, self.beta, counts[k]);
-            motion.moved_rad[k] = T::from_i32(moved) * scale.rad;
+            motion.moved_rad[k] = moved as f32 * scale.rad;
             motion.count_changes[k] = moved.unsigned_abs();
             motion.angles_rad[k] =
-                (T::from_i32(track.count.wrapping_sub(scale.zero_count)) + track.ahead) * scale.rad;
+                (track.count.wrapping_sub(scale.zero_count) as f32 + track.ahead) * scale.rad;
             motion.speeds_rad_s[k] = track.speed * scale.rad_s;
         }
         motion
     }
 
     /// Delay `D` of the speed, s.
-    pub fn speed_delay_s(&self) -> T {
-        (self.n - T::from_f64(0.5)) * self.period_s
+    pub fn speed_delay_s(&self) -> f32 {
+        (self.n - 0.5) * self.period_s
     }
 
     /// Noise of a joint's speed by quantisation, mean over all constant speeds, rad/s rms.
-    pub fn speed_noise_rad_s(&self, joint: usize) -> T {
-        let six = T::from_i32(6);
+    pub fn speed_noise_rad_s(&self, joint: usize) -> f32 {
+        let six = 6.0;
         self.rad_s(joint) / (self.n * (six * self.n).square_root())
     }
 
     /// Speed of one count a tick, rad/s.
-    pub(crate) fn rad_s(&self, joint: usize) -> T {
-        self.scales.get(joint).map_or(T::zero(), |scale| scale.rad_s.magnitude())
+    pub(crate) fn rad_s(&self, joint: usize) -> f32 {
+        self.scales.get(joint).map_or(0.0, |scale| scale.rad_s.magnitude())
     }
 }
 
-impl<T: Real> Track<T> {
+impl Track {
     /// One step of the filter; returns by how many counts the joint moved. Everything is measured from the newest count, so
     /// that the residual is the prediction's lead with the opposite sign.
-    fn follow(&mut self, keep: T, beta: T, count: i32) -> i32 {
+    fn follow(&mut self, keep: f32, beta: f32, count: i32) -> i32 {
         let moved = count.wrapping_sub(self.count);
         self.count = count;
-        let moved_counts = T::from_i32(moved);
-        let half = T::from_f64(0.5);
+        let moved_counts = moved as f32;
+        let half = 0.5;
         self.play = (self.play - moved_counts).limited(-half, half);
         let lead = self.ahead + self.speed - moved_counts - self.play;
         self.ahead = self.play + keep * lead;
         self.speed -= beta * lead;
         // A millionth of a count is nothing; without this a joint at rest would crawl through the subnormal numbers.
-        let nothing = T::from_f64(1e-6);
+        let nothing = 1e-6;
         if lead.magnitude() < nothing && self.speed.magnitude() < nothing {
             self.ahead = self.play;
-            self.speed = T::zero();
+            self.speed = 0.0;
         }
         moved
     }
@@ -302,26 +294,26 @@ mod tests {
     /// The paper's encoder behind its gear (Table V): 4,000 counts a turn, 5.4 : 1.
     const RAD_PER_COUNT: f64 = core::f64::consts::TAU / (4000.0 * 5.4);
 
-    fn estimator<T: Real>(bandwidth_hz: f64, zero_count: i32, reversed: bool) -> Estimator<T, 1> {
-        let rad_per_count = T::from_f64(RAD_PER_COUNT);
+    fn estimator(bandwidth_hz: f64, zero_count: i32, reversed: bool) -> Estimator<1> {
+        let rad_per_count = RAD_PER_COUNT as f32;
         EstimatorConfig {
-            bandwidth_hz: T::from_f64(bandwidth_hz),
+            bandwidth_hz: bandwidth_hz as f32,
             encoders: [Encoder { zero_count, rad_per_count, reversed }],
         }
         .prepare(1, Period::from_us(1000).unwrap())
         .unwrap()
     }
 
-    fn run<T: Real>(estimator: &Estimator<T, 1>, counts: impl Iterator<Item = i32>) -> Vec<Motion<T, 1>> {
+    fn run(estimator: &Estimator<1>, counts: impl Iterator<Item = i32>) -> Vec<Motion<1>> {
         let mut tracks = Tracks::new();
         counts.map(|count| estimator.update(&mut tracks, &[count])).collect()
     }
 
     /// Root of the mean square of `speed - true speed`, after the filter has settled.
-    fn speed_rms(estimator: &Estimator<f64, 1>, speed_rad_s: f64, counts: impl Iterator<Item = i32>) -> f64 {
+    fn speed_rms(estimator: &Estimator<1>, speed_rad_s: f64, counts: impl Iterator<Item = i32>) -> f64 {
         let motions = run(estimator, counts);
         let settled = &motions[500..];
-        let squares: f64 = settled.iter().map(|m| (m.speeds_rad_s[0] - speed_rad_s).powi(2)).sum();
+        let squares: f64 = settled.iter().map(|m| (f64::from(m.speeds_rad_s[0]) - speed_rad_s).powi(2)).sum();
         (squares / settled.len() as f64).square_root()
     }
 
@@ -330,21 +322,24 @@ mod tests {
         // Counts k^2 have the acceleration of 2 counts per tick per tick exactly, without quantisation; the speed at
         // tick k is 2 k.
         for (bandwidth_hz, stated_ms) in [(50.0, 5.87), (100.0, 2.68), (200.0, 1.09)] {
-            let estimator = estimator::<f64>(bandwidth_hz, 0, false);
-            let motions = run(&estimator, (0..2000).map(|k| k * k));
-            let (k, last) = (1999.0, motions.last().unwrap());
+            // Zero is where it ends, so that the angle is a small number there.
+            let estimator = estimator(bandwidth_hz, 200 * 200, false);
+            let n = f64::from(estimator.n);
+            let last = run(&estimator, (0..=200).map(|k| k * k)).pop().unwrap();
             let acceleration = 2.0 * RAD_PER_COUNT / 1e-6;
-            let delay_s = (2.0 * k * RAD_PER_COUNT / 1e-3 - last.speeds_rad_s[0]) / acceleration;
+            let speed_rad_s = 2.0 * 200.0 * RAD_PER_COUNT / 1e-3;
+            let delay_s = (speed_rad_s - f64::from(last.speeds_rad_s[0])) / acceleration;
             // Less the half count of the play.
-            let lag_s2 = ((k * k - 0.5) * RAD_PER_COUNT - last.angles_rad[0]) / acceleration;
+            let lag_s2 = (-0.5 * RAD_PER_COUNT - f64::from(last.angles_rad[0])) / acceleration;
             println!(
                 "{bandwidth_hz} Hz: speed late by {:.3} ms, angle by {:.3} ms^2",
                 1e3 * delay_s,
                 1e6 * lag_s2
             );
-            // Rounding of speeds of 4,000 counts a tick in f64, with room.
-            assert!((delay_s - estimator.speed_delay_s()).abs() < 1e-9, "{delay_s}");
-            assert!((lag_s2 - 1e-6 * (0.5 * (estimator.n - 1.0)).powi(2)).abs() < 1e-12, "{lag_s2}");
+            // Speeds of 400 counts a tick are rounded by 2e-5 of a count; the loop keeps the roundings of some `n` ticks. A
+            // thousandth of a count a tick is half a microsecond of delay.
+            assert!((delay_s - f64::from(estimator.speed_delay_s())).abs() < 5e-7, "{delay_s}");
+            assert!((lag_s2 - 1e-6 * (0.5 * (n - 1.0)).powi(2)).abs() < 1e-9, "{lag_s2}");
             assert!((1e3 * delay_s - stated_ms).abs() < 0.005, "{delay_s}");
         }
     }
@@ -354,7 +349,7 @@ mod tests {
         for (bandwidth_hz, mean, worst) in
             [(50.0, 0.007, 0.013), (100.0, 0.021, 0.028), (200.0, 0.059, 0.068)]
         {
-            let estimator = estimator::<f64>(bandwidth_hz, 0, false);
+            let estimator = estimator(bandwidth_hz, 0, false);
             // Speeds spread evenly over zero to one count a tick: beyond, the quantisation error repeats.
             let speeds = 401;
             let (mut squares, mut largest) = (0.0, 0.0_f64);
@@ -369,9 +364,11 @@ mod tests {
                 largest = largest.max(rms);
             }
             let rms = (squares / f64::from(speeds)).square_root();
-            let derived = estimator.speed_noise_rad_s(0);
-            let bound =
-                RAD_PER_COUNT / 12.0_f64.square_root() / 1e-3 / (estimator.n.powi(2) - 1.0).square_root();
+            let derived = f64::from(estimator.speed_noise_rad_s(0));
+            let bound = RAD_PER_COUNT
+                / 12.0_f64.square_root()
+                / 1e-3
+                / (f64::from(estimator.n).powi(2) - 1.0).square_root();
             println!(
                 "{bandwidth_hz} Hz: {rms:.4} rad/s over all speeds (derived {derived:.4}), worst {largest:.4} (bound {bound:.4})"
             );
@@ -385,7 +382,7 @@ mod tests {
 
     #[test]
     fn a_count_that_toggles_on_its_edge_is_standstill() {
-        let estimator = estimator::<f32>(50.0, 0, false);
+        let estimator = estimator(50.0, 0, false);
         for pace in [1, 2, 7, 40] {
             let motions = run(&estimator, (0..2000).map(|k| 100 + (k / pace) % 2));
             for motion in &motions[500..] {
@@ -400,7 +397,7 @@ mod tests {
 
     #[test]
     fn a_joint_at_rest_has_exactly_no_speed() {
-        let estimator = estimator::<f32>(100.0, 0, false);
+        let estimator = estimator(100.0, 0, false);
         let motions = run(&estimator, (0..500).map(|k| k.min(100)));
         assert!(motions[100].speeds_rad_s[0] > 0.2);
         let last = motions.last().unwrap();
@@ -410,7 +407,7 @@ mod tests {
 
     #[test]
     fn the_first_sample_starts_it_at_rest() {
-        let estimator = estimator::<f32>(100.0, 1000, true);
+        let estimator = estimator(100.0, 1000, true);
         let mut tracks = Tracks::new();
         let motion = estimator.update(&mut tracks, &[400]);
         assert_eq!(motion.speeds_rad_s, [0.0]);
@@ -423,9 +420,9 @@ mod tests {
     #[test]
     fn counters_may_wrap_and_counts_may_be_large() {
         // Once around zero, once around the largest count: the same motion to the last bit.
-        let small = run(&estimator::<f32>(100.0, 0, false), (0..2000).map(|k| k * k / 500 - 2000));
+        let small = run(&estimator(100.0, 0, false), (0..2000).map(|k| k * k / 500 - 2000));
         let large = run(
-            &estimator::<f32>(100.0, i32::MAX, false),
+            &estimator(100.0, i32::MAX, false),
             (0..2000).map(|k| i32::MAX.wrapping_add(k * k / 500 - 2000)),
         );
         assert_eq!(small, large);
@@ -433,7 +430,7 @@ mod tests {
 
     #[test]
     fn a_jump_is_told_and_forgotten() {
-        let estimator = estimator::<f32>(100.0, 0, false);
+        let estimator = estimator(100.0, 0, false);
         let counts = [0, 0, i32::MIN, i32::MIN];
         let motions = run(&estimator, counts.into_iter().chain(std::iter::repeat_n(i32::MIN, 300)));
         assert_eq!(motions[2].count_changes, [1 << 31]);
@@ -446,11 +443,11 @@ mod tests {
     fn parameters_out_of_range_are_named() {
         let encoder = Encoder { zero_count: 0, rad_per_count: 1e-3, reversed: false };
         let period = Period::from_us(1000).unwrap();
-        for bandwidth_hz in [0.0, -1.0, f64::NAN, f64::INFINITY, 0.1, 319.0] {
+        for bandwidth_hz in [0.0, -1.0, f32::NAN, f32::INFINITY, 0.1, 319.0] {
             let config = EstimatorConfig { bandwidth_hz, encoders: [encoder; 2] };
             assert_eq!(config.prepare(2, period).unwrap_err().parameter, "estimator.bandwidth_hz");
         }
-        for rad_per_count in [0.0, -1.0, f64::NAN, f64::INFINITY, 2.0] {
+        for rad_per_count in [0.0, -1.0, f32::NAN, f32::INFINITY, 2.0] {
             let config = EstimatorConfig {
                 bandwidth_hz: 100.0,
                 encoders: [encoder, Encoder { rad_per_count, ..encoder }],

@@ -33,94 +33,89 @@
 use crate::buffer::BufferTooSmall;
 use crate::control::{Gains, Monitor};
 use crate::estimate::Motion;
-use crate::math::Real;
 use crate::telemetry::snapshot::{Loader, Saver, SnapshotError};
 
 /// What a tick enters.
 #[derive(Clone, Copy, Debug)]
-pub struct Entry<'a, T, const J: usize> {
+pub struct Entry<'a, const J: usize> {
     /// How the joints move.
-    pub motion: &'a Motion<T, J>,
+    pub motion: &'a Motion<J>,
     /// Torques of the tick before, N m.
-    pub last_nm: &'a [T; J],
+    pub last_nm: &'a [f32; J],
     /// What the law does in this tick; `None` without torque.
-    pub law: Option<Doing<T>>,
+    pub law: Option<Doing>,
     /// The tick period, s.
-    pub period_s: T,
+    pub period_s: f32,
 }
 
 /// The law in a tick.
 #[derive(Clone, Copy, Debug)]
-pub struct Doing<T> {
+pub struct Doing {
     /// Gains that act.
-    pub gains: Gains<T>,
+    pub gains: Gains<f32>,
     /// Potentials at these gains.
-    pub monitor: Monitor<T>,
+    pub monitor: Monitor<f32>,
     /// Power that the damping takes, W.
-    pub damping_w: T,
+    pub damping_w: f32,
 }
 
 /// What is remembered from tick to tick.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Ledger<T, const J: usize> {
+pub struct Ledger<const J: usize> {
     /// Torques of the tick before the last, N m.
-    before_nm: [T; J],
+    before_nm: [f32; J],
     /// The law in the last tick.
-    terms: [Term<T>; 4],
-    work: Sum<T>,
-    damped: Sum<T>,
-    excess_j: T,
+    terms: [Term; 4],
+    work: Sum,
+    damped: Sum,
+    excess_j: f32,
 }
 
 /// A potential and the gain that it is proportional to.
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct Term<T> {
-    gain: T,
-    potential_j: T,
+struct Term {
+    gain: f32,
+    potential_j: f32,
 }
 
-impl<T: Real> Term<T> {
-    const fn new(gain: T, potential_j: T) -> Self {
+impl Term {
+    const fn new(gain: f32, potential_j: f32) -> Self {
         Self { gain, potential_j }
     }
 
     /// Those of the law. The weight is held or not.
-    fn all(law: Option<Doing<T>>) -> [Self; 4] {
-        let zero = T::zero();
+    fn all(law: Option<Doing>) -> [Self; 4] {
+        let zero = 0.0;
         let Some(Doing { gains, monitor, .. }) = law else { return [Self::new(zero, zero); 4] };
         [
             Self::new(gains.force_n, monitor.approach_potential_j),
             Self::new(gains.attitude_stiffness_nm, monitor.attitude_potential_j),
             Self::new(gains.integral_gain_nm_rad, monitor.integral_potential_j),
-            Self::new(T::one(), -monitor.weight_potential_j),
+            Self::new(1.0, -monitor.weight_potential_j),
         ]
     }
 
     /// By how much the potential has fallen since `before`, at the gain that it had then. A term that acted not before, or
     /// acts no more, gives nothing.
-    fn drop_since(&self, before: &Self) -> T {
-        if self.gain > T::zero() {
-            before.potential_j - self.potential_j * (before.gain / self.gain)
-        } else {
-            T::zero()
-        }
+    fn drop_since(&self, before: &Self) -> f32 {
+        if self.gain > 0.0 { before.potential_j - self.potential_j * (before.gain / self.gain) } else { 0.0 }
     }
 }
 
 /// A sum that keeps what rounding takes from it.
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct Sum<T> {
-    sum: T,
+struct Sum {
+    sum: f32,
     /// By how much the sum is too large.
-    over: T,
+    over: f32,
 }
 
-impl<T: Real> Sum<T> {
+impl Sum {
     fn zero() -> Self {
-        Self { sum: T::zero(), over: T::zero() }
+        Self { sum: 0.0, over: 0.0 }
     }
 
-    fn add(&mut self, value: T) {
+    fn add(&mut self, value: f32) {
         let value = value - self.over;
         let sum = self.sum + value;
         self.over = (sum - self.sum) - value;
@@ -128,22 +123,22 @@ impl<T: Real> Sum<T> {
     }
 }
 
-impl<T: Real, const J: usize> Ledger<T, J> {
+impl<const J: usize> Ledger<J> {
     /// Nothing was done.
     pub fn new() -> Self {
         Self {
-            before_nm: [T::zero(); J],
+            before_nm: [0.0; J],
             terms: Term::all(None),
             work: Sum::zero(),
             damped: Sum::zero(),
-            excess_j: T::zero(),
+            excess_j: 0.0,
         }
     }
 
     /// Enters a tick.
-    pub fn enter(&mut self, entry: &Entry<'_, T, J>) {
-        let mut work = T::zero();
-        let half = T::from_f64(0.5);
+    pub fn enter(&mut self, entry: &Entry<'_, J>) {
+        let mut work = 0.0;
+        let half = 0.5;
         for ((moved, last), before) in
             entry.motion.moved_rad.iter().zip(entry.last_nm).zip(&mut self.before_nm)
         {
@@ -154,7 +149,7 @@ impl<T: Real, const J: usize> Ledger<T, J> {
         self.work.add(work);
         let terms = Term::all(entry.law);
         let pairs = terms.iter().zip(&self.terms);
-        let drop = pairs.fold(T::zero(), |drop, (now, before)| drop + now.drop_since(before));
+        let drop = pairs.fold(0.0, |drop, (now, before)| drop + now.drop_since(before));
         self.terms = terms;
         match entry.law {
             Some(Doing { damping_w, .. }) => {
@@ -163,7 +158,7 @@ impl<T: Real, const J: usize> Ledger<T, J> {
                 self.excess_j += work - drop - self.excess_j * entry.period_s;
             }
             // What feeds it is gone.
-            None => self.excess_j = T::zero(),
+            None => self.excess_j = 0.0,
         }
     }
 
@@ -174,22 +169,22 @@ impl<T: Real, const J: usize> Ledger<T, J> {
     }
 
     /// Work of the motors since the grasp began, J; before the first, since the start.
-    pub fn work_j(&self) -> T {
+    pub fn work_j(&self) -> f32 {
         self.work.sum
     }
 
     /// What the law's damping has taken in the same time, J.
-    pub fn damped_j(&self) -> T {
+    pub fn damped_j(&self) -> f32 {
         self.damped.sum
     }
 
     /// Work beyond the drop of the potentials in the last second (fading), J.
-    pub fn excess_j(&self) -> T {
+    pub fn excess_j(&self) -> f32 {
         self.excess_j
     }
 }
 
-impl<const J: usize> Ledger<f32, J> {
+impl<const J: usize> Ledger<J> {
     pub(crate) fn save(&self, joints: usize, to: &mut Saver<'_>) -> Result<(), BufferTooSmall> {
         to.f32s(&self.before_nm, joints)?;
         for term in &self.terms {
@@ -216,7 +211,7 @@ impl<const J: usize> Ledger<f32, J> {
     }
 }
 
-impl<T: Real, const J: usize> Default for Ledger<T, J> {
+impl<const J: usize> Default for Ledger<J> {
     fn default() -> Self {
         Self::new()
     }
@@ -229,7 +224,7 @@ mod tests {
     const PERIOD_S: f32 = 1e-3;
 
     /// A law with a potential `V_s`, J, at a force of one newton for each joule.
-    fn approach(potential_j: f32, damping_w: f32) -> Option<Doing<f32>> {
+    fn approach(potential_j: f32, damping_w: f32) -> Option<Doing> {
         Some(Doing {
             gains: Gains { force_n: potential_j, ..Gains::none() },
             monitor: Monitor { approach_potential_j: potential_j, ..Monitor::none() },
@@ -238,7 +233,7 @@ mod tests {
     }
 
     /// Enters a tick of one joint.
-    fn enter(ledger: &mut Ledger<f32, 1>, moved_rad: f32, last_nm: f32, law: Option<Doing<f32>>) {
+    fn enter(ledger: &mut Ledger<1>, moved_rad: f32, last_nm: f32, law: Option<Doing>) {
         let motion = Motion { moved_rad: [moved_rad], ..Motion::still() };
         ledger.enter(&Entry { motion: &motion, last_nm: &[last_nm], law, period_s: PERIOD_S });
     }
@@ -247,7 +242,7 @@ mod tests {
     /// rounding only. Without what it keeps, it would be off by more than a hundredth.
     #[test]
     fn hours_lose_no_digits() {
-        let mut ledger = Ledger::<f32, 1>::new();
+        let mut ledger = Ledger::<1>::new();
         let (mut exact_j, mut exact_damped_j, mut plain_j) = (0.0_f64, 0.0_f64, 0.0_f32);
         for k in 0..2 * 3_600_000_u32 {
             let (moved_rad, damping_w) = (1e-5 + 1e-9 * (k % 1000) as f32, 2e-4 + 1e-8 * (k % 77) as f32);
@@ -273,7 +268,7 @@ mod tests {
     /// A posture that stays does no work, whatever becomes of the gains.
     #[test]
     fn gains_that_change_are_no_work() {
-        let mut ledger = Ledger::<f32, 1>::new();
+        let mut ledger = Ledger::<1>::new();
         for k in (0..=100).chain((0..100).rev()) {
             let share = k as f32 / 100.0;
             enter(&mut ledger, 0.0, share, approach(0.25 * share, 0.0));
@@ -285,7 +280,7 @@ mod tests {
     /// Work beside what the potential gives is excess, which fades by 1/e in a second; without torque there is none.
     #[test]
     fn what_the_potential_does_not_give_is_excess() {
-        let mut ledger = Ledger::<f32, 1>::new();
+        let mut ledger = Ledger::<1>::new();
         enter(&mut ledger, 0.0, 0.0, approach(1.0, 0.0));
         enter(&mut ledger, 0.0, 2.0, approach(1.0, 0.0));
         let law = |potential_j: f32| {

@@ -1,6 +1,5 @@
 //! The tick period. Time is counted in whole ticks: a float that counts seconds stops advancing after some hours.
 
-use crate::math::Real;
 use crate::parameter::ParameterError;
 use core::num::NonZeroU32;
 
@@ -34,8 +33,8 @@ impl Period {
     }
 
     /// The period, s.
-    pub fn seconds<T: Real>(self) -> T {
-        T::from_i32(self.microseconds() as i32) / T::from_i32(1_000_000)
+    pub fn seconds(self) -> f32 {
+        self.microseconds() as f32 / 1_000_000.0
     }
 
     /// Ticks that a time in ms takes, rounded up.
@@ -65,7 +64,7 @@ mod tests {
         let period = Period::from_us(1000).unwrap();
         assert_eq!(period.ticks(0, "t"), Ok(0));
         assert_eq!(period.ticks(250, "t"), Ok(250));
-        assert_eq!(period.seconds::<f32>(), 1e-3);
+        assert_eq!(period.seconds(), 1e-3);
         let period = Period::from_us(300).unwrap();
         assert_eq!(period.ticks(1, "t"), Ok(4));
         assert_eq!(period.ticks(LONGEST_MS, "t"), Ok(12_000_000));

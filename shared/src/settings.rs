@@ -109,7 +109,7 @@ impl Slot<'_> {
     }
 }
 
-impl<const J: usize, const F: usize> Params<f32, J, F> {
+impl<const J: usize, const F: usize> Params<J, F> {
     /// Reads a parameter. Times in ms are whole numbers.
     ///
     /// # Errors
@@ -137,7 +137,7 @@ impl<const J: usize, const F: usize> Params<f32, J, F> {
     }
 }
 
-impl<const J: usize> Config<f32, J> {
+impl<const J: usize> Config<J> {
     /// Puts a parameter in, without looking at the others: [`Params::new`] does. `None` switches off what it belongs to,
     /// with all its joints and parameters; a value switches it on, with zeros for the rest.
     ///
@@ -205,7 +205,7 @@ impl<const J: usize> Config<f32, J> {
 
 /// Where a parameter is kept in a configuration.
 fn slot<const J: usize>(
-    config: &mut Config<f32, J>,
+    config: &mut Config<J>,
     joint_count: usize,
     parameter: Parameter,
     index: u8,

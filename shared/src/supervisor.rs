@@ -30,7 +30,6 @@
 use crate::buffer::BufferTooSmall;
 use crate::command::{Answer, Command, Refusal};
 use crate::fault::{Fault, Raised, Reaction};
-use crate::math::Real;
 use crate::parameter::ParameterError;
 use crate::period::Period;
 use crate::telemetry::snapshot::{Loader, Saver, SnapshotError};
@@ -135,7 +134,7 @@ impl SupervisorConfig {
     ///
     /// # Errors
     /// A time above an hour.
-    pub fn prepare<T: Real>(&self, period: Period) -> Result<Ramps<T>, ParameterError> {
+    pub fn prepare(&self, period: Period) -> Result<Ramps, ParameterError> {
         Ok(Ramps {
             soft_start: Ramp::new(period.ticks(self.soft_start_ms, "supervisor.soft_start_ms")?),
             release: Ramp::new(period.ticks(self.release_ms, "supervisor.release_ms")?),
@@ -145,37 +144,37 @@ impl SupervisorConfig {
 
 /// The ramps of force and stiffness, prepared.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Ramps<T> {
-    soft_start: Ramp<T>,
-    release: Ramp<T>,
+pub struct Ramps {
+    soft_start: Ramp,
+    release: Ramp,
 }
 
 /// A share that grows by the tick from nothing to one.
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct Ramp<T> {
+struct Ramp {
     ticks: u32,
-    per_tick: T,
+    per_tick: f32,
 }
 
-impl<T: Real> Ramp<T> {
+impl Ramp {
     fn new(ticks: u32) -> Self {
         let whole = i32::try_from(ticks.max(1)).unwrap_or(i32::MAX);
-        Self { ticks, per_tick: T::one() / T::from_i32(whole) }
+        Self { ticks, per_tick: 1.0 / whole as f32 }
     }
 
     /// The share in the tick after `age` others; the last tick of the ramp has exactly one.
-    fn share(&self, age: u32) -> T {
+    fn share(&self, age: u32) -> f32 {
         let tick = age.saturating_add(1);
         if tick >= self.ticks {
-            return T::one();
+            return 1.0;
         }
-        T::from_i32(i32::try_from(tick).unwrap_or(i32::MAX)) * self.per_tick
+        tick as f32 * self.per_tick
     }
 }
 
 /// What the joints are driven by in a tick.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Drive<T> {
+pub enum Drive {
     /// Nothing: no torque.
     Off,
     /// Damping, and what holds the weight.
@@ -183,9 +182,9 @@ pub enum Drive<T> {
     /// The grasp law.
     Grip {
         /// Share of `f_d`.
-        force_share: T,
+        force_share: f32,
         /// Share of `K_st` and `K_I`.
-        stiffness_share: T,
+        stiffness_share: f32,
     },
 }
 
@@ -244,9 +243,9 @@ impl Supervisor {
 
     /// Begins a tick: `fault` is one that is there now, `objection` why the command can't be done even in a mode that
     /// takes it. Answers the command.
-    pub fn begin<T: Real>(
+    pub fn begin(
         &mut self,
-        ramps: &Ramps<T>,
+        ramps: &Ramps,
         fault: Option<Raised>,
         command: Option<Command>,
         objection: Option<Refusal>,
@@ -277,15 +276,15 @@ impl Supervisor {
     }
 
     /// What drives the joints in this tick.
-    pub fn drive<T: Real>(&self, ramps: &Ramps<T>) -> Drive<T> {
+    pub fn drive(&self, ramps: &Ramps) -> Drive {
         match self.mode {
             Mode::Disarmed | Mode::Fault => Drive::Off,
             Mode::Armed => Drive::Hold,
             Mode::Grasping => {
-                Drive::Grip { force_share: ramps.soft_start.share(self.age), stiffness_share: T::one() }
+                Drive::Grip { force_share: ramps.soft_start.share(self.age), stiffness_share: 1.0 }
             }
             Mode::Releasing => {
-                let left = T::one() - ramps.release.share(self.age);
+                let left = 1.0 - ramps.release.share(self.age);
                 Drive::Grip {
                     force_share: ramps.soft_start.share(self.grasped) * left,
                     stiffness_share: left,
@@ -295,7 +294,7 @@ impl Supervisor {
     }
 
     /// Whether the force is on its way up or down, so that torques change with it.
-    pub fn ramps<T: Real>(&self, ramps: &Ramps<T>) -> bool {
+    pub fn ramps(&self, ramps: &Ramps) -> bool {
         match self.mode {
             Mode::Disarmed | Mode::Armed | Mode::Fault => false,
             Mode::Grasping => self.age < ramps.soft_start.ticks,
@@ -358,12 +357,12 @@ mod tests {
     const RAISED: Raised = Raised { fault: Fault::Overspeed, joint: Some(2) };
     const GRASP: Command = Command::Grasp(Grasp::CONFIGURED);
 
-    fn ramps(soft_start_ms: u32, release_ms: u32) -> Ramps<f64> {
+    fn ramps(soft_start_ms: u32, release_ms: u32) -> Ramps {
         SupervisorConfig { soft_start_ms, release_ms }.prepare(Period::from_us(1000).unwrap()).unwrap()
     }
 
     /// A supervisor that was led into a mode.
-    fn in_mode(mode: Mode, ramps: &Ramps<f64>) -> Supervisor {
+    fn in_mode(mode: Mode, ramps: &Ramps) -> Supervisor {
         let mut supervisor = Supervisor::new();
         let commands: &[Command] = match mode {
             Mode::Disarmed | Mode::Fault => &[],
@@ -541,7 +540,7 @@ mod tests {
     }
 
     /// Force and attitude shares of a tick.
-    fn shares(supervisor: &Supervisor, ramps: &Ramps<f64>) -> (f64, f64) {
+    fn shares(supervisor: &Supervisor, ramps: &Ramps) -> (f32, f32) {
         match supervisor.drive(ramps) {
             Drive::Grip { force_share, stiffness_share } => (force_share, stiffness_share),
             drive => panic!("{drive:?}"),
@@ -549,8 +548,8 @@ mod tests {
     }
 
     #[track_caller]
-    fn near(shares: (f64, f64), force: f64, attitude: f64) {
-        assert!((shares.0 - force).abs() < 1e-12 && (shares.1 - attitude).abs() < 1e-12, "{shares:?}");
+    fn near(shares: (f32, f32), force: f32, attitude: f32) {
+        assert!((shares.0 - force).abs() < 1e-6 && (shares.1 - attitude).abs() < 1e-6, "{shares:?}");
     }
 
     #[test]
@@ -605,8 +604,8 @@ mod tests {
     fn times_out_of_range_are_named() {
         let period = Period::from_us(1000).unwrap();
         let config = SupervisorConfig { soft_start_ms: 4_000_000, release_ms: 0 };
-        assert_eq!(config.prepare::<f32>(period).unwrap_err().parameter, "supervisor.soft_start_ms");
+        assert_eq!(config.prepare(period).unwrap_err().parameter, "supervisor.soft_start_ms");
         let config = SupervisorConfig { soft_start_ms: 0, release_ms: 4_000_000 };
-        assert_eq!(config.prepare::<f32>(period).unwrap_err().parameter, "supervisor.release_ms");
+        assert_eq!(config.prepare(period).unwrap_err().parameter, "supervisor.release_ms");
     }
 }

@@ -23,7 +23,6 @@ use crate::fault::{Driven, Fault, FaultConfig, Raised, Watch};
 use crate::hand::Hand;
 use crate::ledger::{Doing, Entry};
 use crate::limit::{LimitConfig, Limiting, Limits};
-use crate::math::Real;
 use crate::parameter::ParameterError;
 use crate::period::Period;
 use crate::supervisor::{Drive, Mode, Ramps, SupervisorConfig};
@@ -31,45 +30,45 @@ use crate::telemetry::{List, Record};
 
 /// Everything that can be set, in SI units.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Config<T, const J: usize> {
+pub struct Config<const J: usize> {
     /// Time from one tick to the next, us.
     pub period_us: u32,
     /// Encoders and filter.
-    pub estimator: EstimatorConfig<T, J>,
+    pub estimator: EstimatorConfig<J>,
     /// Gains of the grasp law.
-    pub law: GraspConfig<T, J>,
+    pub law: GraspConfig<f32, J>,
     /// Limits.
-    pub limits: LimitConfig<T, J>,
+    pub limits: LimitConfig<J>,
     /// Where faults begin.
-    pub faults: FaultConfig<T, J>,
+    pub faults: FaultConfig<J>,
     /// Times of grasping and releasing.
     pub supervisor: SupervisorConfig,
 }
 
 /// Everything that the tick needs and never changes: checked, and prepared once.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Params<T, const J: usize, const F: usize> {
-    hand: Hand<T, J, F>,
-    prepared: Prepared<T, J>,
+pub struct Params<const J: usize, const F: usize> {
+    hand: Hand<f32, J, F>,
+    prepared: Prepared<J>,
 }
 
 /// A configuration, checked and prepared.
 #[derive(Clone, Debug, PartialEq)]
-struct Prepared<T, const J: usize> {
-    config: Config<T, J>,
+struct Prepared<const J: usize> {
+    config: Config<J>,
     period: Period,
-    period_s: T,
-    estimator: Estimator<T, J>,
-    law: GraspLaw<T, J>,
-    limits: Limits<T, J>,
-    watch: Watch<T, J>,
-    ramps: Ramps<T>,
+    period_s: f32,
+    estimator: Estimator<J>,
+    law: GraspLaw<f32, J>,
+    limits: Limits<J>,
+    watch: Watch<J>,
+    ramps: Ramps,
 }
 
-impl<T: Real, const J: usize> Prepared<T, J> {
+impl<const J: usize> Prepared<J> {
     /// Not inlined: the firmware would have it twice, at the start and where parameters are set.
     #[inline(never)]
-    fn new<const F: usize>(hand: &Hand<T, J, F>, config: &Config<T, J>) -> Result<Self, ParameterError> {
+    fn new<const F: usize>(hand: &Hand<f32, J, F>, config: &Config<J>) -> Result<Self, ParameterError> {
         let period = Period::from_us(config.period_us)?;
         let estimator = config.estimator.prepare(hand.joint_count(), period)?;
         let limits = config.limits.prepare(hand, period)?;
@@ -98,12 +97,12 @@ impl<T: Real, const J: usize> Prepared<T, J> {
     }
 }
 
-impl<T: Real, const J: usize, const F: usize> Params<T, J, F> {
+impl<const J: usize, const F: usize> Params<J, F> {
     /// Checks all parameters and prepares them.
     ///
     /// # Errors
     /// The first parameter that is wrong, with its joint and the reason.
-    pub fn new(hand: Hand<T, J, F>, config: &Config<T, J>) -> Result<Self, ParameterError> {
+    pub fn new(hand: Hand<f32, J, F>, config: &Config<J>) -> Result<Self, ParameterError> {
         Ok(Self { prepared: Prepared::new(&hand, config)?, hand })
     }
 
@@ -111,18 +110,18 @@ impl<T: Real, const J: usize, const F: usize> Params<T, J, F> {
     ///
     /// # Errors
     /// As [`Self::new`]; nothing changes then.
-    pub fn configure(&mut self, config: &Config<T, J>) -> Result<(), ParameterError> {
+    pub fn configure(&mut self, config: &Config<J>) -> Result<(), ParameterError> {
         self.prepared = Prepared::new(&self.hand, config)?;
         Ok(())
     }
 
     /// The hand.
-    pub fn hand(&self) -> &Hand<T, J, F> {
+    pub fn hand(&self) -> &Hand<f32, J, F> {
         &self.hand
     }
 
     /// The configuration.
-    pub fn config(&self) -> &Config<T, J> {
+    pub fn config(&self) -> &Config<J> {
         &self.prepared.config
     }
 
@@ -132,21 +131,21 @@ impl<T: Real, const J: usize, const F: usize> Params<T, J, F> {
     }
 
     /// The estimator: its delay and noise.
-    pub fn estimator(&self) -> &Estimator<T, J> {
+    pub fn estimator(&self) -> &Estimator<J> {
         &self.prepared.estimator
     }
 
     /// The grasp law.
-    pub fn law(&self) -> &GraspLaw<T, J> {
+    pub fn law(&self) -> &GraspLaw<f32, J> {
         &self.prepared.law
     }
 }
 
 /// What a tick takes in.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Input<'a, T, const J: usize> {
+pub struct Input<'a, const J: usize> {
     /// What is known of the joints.
-    pub sensed: Sensed<'a, T, J>,
+    pub sensed: Sensed<'a, J>,
     /// What else happened.
     pub events: Events,
     /// What the user asks for.
@@ -155,28 +154,28 @@ pub struct Input<'a, T, const J: usize> {
 
 /// What is known of the joints in a tick.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Sensed<'a, T, const J: usize> {
+pub enum Sensed<'a, const J: usize> {
     /// Encoder counts.
     Counts(&'a [i32; J]),
     /// Angles, rad, and speeds, rad/s, of a simulation without encoders.
     Ideal {
         /// Joint angles, rad.
-        angles_rad: &'a [T; J],
+        angles_rad: &'a [f32; J],
         /// Joint speeds, rad/s.
-        speeds_rad_s: &'a [T; J],
+        speeds_rad_s: &'a [f32; J],
     },
     /// Nothing, because the joints could not be read or driven. The estimator starts anew with the next counts.
     Failed(Raised),
 }
 
-impl<'a, T: Real, const J: usize> Input<'a, T, J> {
+impl<'a, const J: usize> Input<'a, J> {
     /// Counts, and perhaps a command.
     pub fn counts(counts: &'a [i32; J], command: Option<Command>) -> Self {
         Self { sensed: Sensed::Counts(counts), events: Events::NONE, command }
     }
 
     /// Ideal angles, rad, and speeds, rad/s, and perhaps a command.
-    pub fn ideal(angles_rad: &'a [T; J], speeds_rad_s: &'a [T; J], command: Option<Command>) -> Self {
+    pub fn ideal(angles_rad: &'a [f32; J], speeds_rad_s: &'a [f32; J], command: Option<Command>) -> Self {
         Self { sensed: Sensed::Ideal { angles_rad, speeds_rad_s }, events: Events::NONE, command }
     }
 
@@ -194,19 +193,19 @@ impl<'a, T: Real, const J: usize> Input<'a, T, J> {
 
 /// What a tick puts out.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Output<T, const J: usize> {
+pub struct Output<const J: usize> {
     /// Torques of the next tick, N m; zero beyond the hand's joints.
-    pub torques_nm: [T; J],
+    pub torques_nm: [f32; J],
     /// What there is to tell.
-    pub record: Record<T, J>,
+    pub record: Record<J>,
 }
 
 /// One tick.
-pub fn tick<T: Real, const J: usize, const F: usize>(
-    params: &Params<T, J, F>,
-    state: &mut State<T, J, F>,
-    input: &Input<'_, T, J>,
-) -> Output<T, J> {
+pub fn tick<const J: usize, const F: usize>(
+    params: &Params<J, F>,
+    state: &mut State<J, F>,
+    input: &Input<'_, J>,
+) -> Output<J> {
     let sensed = sense(params, state, &input.sensed);
     let fault = watch(params, state, input, sensed);
     let objection = input.command.and_then(|command| object(params, state, input.events, command));
@@ -277,10 +276,10 @@ pub fn tick<T: Real, const J: usize, const F: usize>(
 }
 
 /// Updates the motion; the fault of the reading or of what it shows.
-fn sense<T: Real, const J: usize, const F: usize>(
-    params: &Params<T, J, F>,
-    state: &mut State<T, J, F>,
-    sensed: &Sensed<'_, T, J>,
+fn sense<const J: usize, const F: usize>(
+    params: &Params<J, F>,
+    state: &mut State<J, F>,
+    sensed: &Sensed<'_, J>,
 ) -> Option<Raised> {
     match *sensed {
         Sensed::Counts(counts) => state.motion = params.prepared.estimator.update(&mut state.tracks, counts),
@@ -288,14 +287,14 @@ fn sense<T: Real, const J: usize, const F: usize>(
             let last_rad = &state.motion.angles_rad;
             let moved_rad = core::array::from_fn(|k| {
                 let moved = angles_rad[k] - last_rad[k];
-                if moved.is_finite() { moved } else { T::zero() }
+                if moved.is_finite() { moved } else { 0.0 }
             });
             state.motion =
                 Motion { angles_rad: *angles_rad, speeds_rad_s: *speeds_rad_s, moved_rad, ..Motion::still() };
             state.tracks.restart();
         }
         Sensed::Failed(raised) => {
-            state.motion.moved_rad = [T::zero(); J];
+            state.motion.moved_rad = [0.0; J];
             state.tracks.restart();
             return Some(raised);
         }
@@ -304,10 +303,10 @@ fn sense<T: Real, const J: usize, const F: usize>(
 }
 
 /// The first fault that is there at the beginning of the tick.
-fn watch<T: Real, const J: usize, const F: usize>(
-    params: &Params<T, J, F>,
-    state: &mut State<T, J, F>,
-    input: &Input<'_, T, J>,
+fn watch<const J: usize, const F: usize>(
+    params: &Params<J, F>,
+    state: &mut State<J, F>,
+    input: &Input<'_, J>,
     sensed: Option<Raised>,
 ) -> Option<Raised> {
     let State { watched, motion, torques_nm, supervisor, .. } = state;
@@ -331,9 +330,9 @@ fn watch<T: Real, const J: usize, const F: usize>(
 }
 
 /// Why a command can't be done even in a mode that takes it.
-fn object<T: Real, const J: usize, const F: usize>(
-    params: &Params<T, J, F>,
-    state: &State<T, J, F>,
+fn object<const J: usize, const F: usize>(
+    params: &Params<J, F>,
+    state: &State<J, F>,
     events: Events,
     command: Command,
 ) -> Option<Refusal> {
@@ -363,39 +362,34 @@ fn object<T: Real, const J: usize, const F: usize>(
 }
 
 /// How firmly a command wants to grasp.
-fn gains<T: Real, const J: usize, const F: usize>(params: &Params<T, J, F>, grasp: Grasp) -> Gains<T> {
+fn gains<const J: usize, const F: usize>(params: &Params<J, F>, grasp: Grasp) -> Gains<f32> {
     let configured = params.prepared.law.gains();
     Gains {
-        force_n: grasp.force_n.map_or(configured.force_n, T::from_f32),
-        attitude_stiffness_nm: grasp
-            .attitude_stiffness_nm
-            .map_or(configured.attitude_stiffness_nm, T::from_f32),
-        integral_gain_nm_rad: grasp.integral_gain_nm_rad.map_or(configured.integral_gain_nm_rad, T::from_f32),
+        force_n: grasp.force_n.unwrap_or(configured.force_n),
+        attitude_stiffness_nm: grasp.attitude_stiffness_nm.unwrap_or(configured.attitude_stiffness_nm),
+        integral_gain_nm_rad: grasp.integral_gain_nm_rad.unwrap_or(configured.integral_gain_nm_rad),
     }
 }
 
 /// What the joints are to be given, and why.
-struct Action<T, const J: usize> {
-    torques_nm: [T; J],
+struct Action<const J: usize> {
+    torques_nm: [f32; J],
     limiting: [Limiting; J],
     /// A torque that is not a finite number.
     not_finite: Option<Raised>,
     /// The law; `None` without torque.
-    doing: Option<Doing<T>>,
+    doing: Option<Doing>,
 }
 
-impl<T: Real, const J: usize> Action<T, J> {
+impl<const J: usize> Action<J> {
     /// No torque.
     fn none() -> Self {
-        Self { torques_nm: [T::zero(); J], limiting: [Limiting::NONE; J], not_finite: None, doing: None }
+        Self { torques_nm: [0.0; J], limiting: [Limiting::NONE; J], not_finite: None, doing: None }
     }
 }
 
 /// The law and the limits, as the mode wants them.
-fn act<T: Real, const J: usize, const F: usize>(
-    params: &Params<T, J, F>,
-    state: &mut State<T, J, F>,
-) -> Action<T, J> {
+fn act<const J: usize, const F: usize>(params: &Params<J, F>, state: &mut State<J, F>) -> Action<J> {
     let drive = state.supervisor.drive(&params.prepared.ramps);
     if !matches!(drive, Drive::Grip { .. }) {
         state.latch = None;

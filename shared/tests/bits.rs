@@ -42,14 +42,14 @@ impl Fnv {
 
 /// A hand of some capacity through 5,000 ticks of jittering, wandering and now and then impossible counts and of
 /// commands in any order; the hashes of all torques and of all records, and how many ticks were spent in each mode.
-fn run<const J: usize, const F: usize>(config: &Config<f32, J>) -> (Fnv, Fnv, [u32; 5]) {
-    let params = params::<f32, J, F>(config);
+fn run<const J: usize, const F: usize>(config: &Config<J>) -> (Fnv, Fnv, [u32; 5]) {
+    let params = params::<J, F>(config);
     let mut state = State::new();
     let mut lcg = Lcg(2009);
     let (mut torques, mut records) = (Fnv::START, Fnv::START);
     let mut ticks_in = [0; 5];
     let mut counts = facing_counts::<J>();
-    let mut buffer = vec![0; Record::<f32, J>::MOST_BYTES];
+    let mut buffer = vec![0; Record::<J>::MOST_BYTES];
     for _ in 0..5_000 {
         for count in counts.iter_mut().take(JOINTS) {
             *count += lcg.below(9) as i32 - 4;
@@ -100,7 +100,7 @@ fn the_bits_are_those_of_every_other_machine() {
 }
 
 /// The same hand with the earlier law: `u_I` in the place of `u_st`.
-fn earlier<const J: usize>() -> Config<f32, J> {
+fn earlier<const J: usize>() -> Config<J> {
     let mut config = config();
     (config.law.attitude_stiffness_nm, config.law.integral_gain_nm_rad) = (0.0, 0.02);
     config

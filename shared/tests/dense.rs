@@ -12,7 +12,7 @@ use blindgrasp_shared::telemetry::dense::{FULL_EVERY_TICKS, TAG, WINDOW, digest,
 use blindgrasp_shared::telemetry::{List, Record};
 use proptest::prelude::*;
 
-type Record12 = Record<f32, 12>;
+type Record12 = Record<12>;
 const MOST: usize = most_bytes(Reply::<12>::MOST_BYTES);
 
 fn record(tick: u32) -> Record12 {
@@ -47,7 +47,7 @@ fn sent(sender: &mut Sender<12>, record: &Record12, signals: Signals) -> Vec<u8>
 }
 
 /// A record to the bit.
-fn bits<const J: usize>(record: &Record<f32, J>) -> Vec<u8> {
+fn bits<const J: usize>(record: &Record<J>) -> Vec<u8> {
     let mut buffer = [0; 1024];
     record.encode(&mut buffer).expect("room").to_vec()
 }

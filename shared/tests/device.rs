@@ -276,7 +276,7 @@ fn parameters_are_set_while_disarmed_and_a_limit_that_is_off_stays_off() {
     let mut bench = Bench::grasping();
     let set = Request::SetParameter { parameter: Parameter::Force, index: 0, value: 1.0 };
     assert_eq!(bench.refused(set), Some(Refusal::NotDisarmed));
-    let mut config = config::<f32, 12>();
+    let mut config = config::<12>();
     config.limits.slew_nm_s = None;
     let mut bench = Bench { device: Device::new(params(&config), identity(Clock::External)), ..Bench::new() };
     bench.ask(Request::Hello { interface_version: INTERFACE_VERSION });
@@ -370,7 +370,7 @@ fn the_longest_messages_fit() {
     let reply: Reply<'_, 1> = Reply::Identity { sequence: u16::MAX, session: u16::MAX, identity };
     let length = postcard_bytes(&reply, &mut buffer).len();
     assert!(length <= Reply::<1>::MOST_BYTES, "{length} {}", Reply::<1>::MOST_BYTES);
-    const { assert!(Record::<f32, 24>::MOST_BYTES < Reply::<24>::MOST_BYTES) };
+    const { assert!(Record::<24>::MOST_BYTES < Reply::<24>::MOST_BYTES) };
 }
 
 /// Requests of every kind, most with values that can't be used.

@@ -12,8 +12,8 @@ use blindgrasp_shared::tick::{Input, Output, Params, State, tick};
 use common::{JOINTS, config, facing_counts, params};
 use proptest::prelude::*;
 
-type HandState = State<f32, 12, 3>;
-type HandParams = Params<f32, 12, 3>;
+type HandState = State<12, 3>;
+type HandParams = Params<12, 3>;
 
 /// Linear congruences.
 struct Lcg(u64);
@@ -34,7 +34,7 @@ struct Step {
 }
 
 impl Step {
-    fn run(&self, params: &HandParams, state: &mut HandState) -> Output<f32, 12> {
+    fn run(&self, params: &HandParams, state: &mut HandState) -> Output<12> {
         let input = match self.failed {
             None => Input::counts(&self.counts, self.command),
             Some(raised) => Input::failed(raised, self.command),
@@ -96,8 +96,8 @@ fn hand() -> HandParams {
     params(&config)
 }
 
-fn bytes(record: &Record<f32, 12>) -> Vec<u8> {
-    let mut buffer = [0; Record::<f32, 12>::MOST_BYTES];
+fn bytes(record: &Record<12>) -> Vec<u8> {
+    let mut buffer = [0; Record::<12>::MOST_BYTES];
     record.encode(&mut buffer).expect("room").to_vec()
 }
 
@@ -141,7 +141,7 @@ fn a_loaded_state_goes_on_to_the_bit_from_every_tick() {
 
 /// Bytes of a state with a latch.
 fn grasping() -> (HandParams, Vec<u8>) {
-    let params = params::<f32, 12, 3>(&config());
+    let params = params::<12, 3>(&config());
     let mut state = HandState::new();
     let counts = facing_counts::<12>();
     for command in [Command::Arm, Command::Grasp(Grasp::CONFIGURED)] {
@@ -155,8 +155,8 @@ fn grasping() -> (HandParams, Vec<u8>) {
 #[test]
 fn the_bytes_do_not_depend_on_the_capacity() {
     let (_, bytes) = grasping();
-    let large = params::<f32, 20, 5>(&config());
-    let state = State::<f32, 20, 5>::load(&large, &bytes).expect("of the same hand");
+    let large = params::<20, 5>(&config());
+    let state = State::<20, 5>::load(&large, &bytes).expect("of the same hand");
     let mut buffer = [0; 4096];
     assert_eq!(state.save(&large, &mut buffer).unwrap(), &bytes[..]);
     assert!(state.save(&large, &mut buffer[..bytes.len() - 1]).is_err());

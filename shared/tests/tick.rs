@@ -12,18 +12,18 @@ use blindgrasp_shared::tick::{Config, Input, Output, Params, State, tick};
 use common::{JOINTS, SLEW_NM_S, TORQUE_NM, config, facing_counts, facing_rad, params};
 use proptest::prelude::*;
 
-type TestParams = Params<f32, 12, 3>;
-type TestState = State<f32, 12, 3>;
+type TestParams = Params<12, 3>;
+type TestState = State<12, 3>;
 
 const GRASP: Command = Command::Grasp(Grasp::CONFIGURED);
 
 /// A joint could not be read.
-fn missing(joint: usize) -> Input<'static, f32, 12> {
+fn missing(joint: usize) -> Input<'static, 12> {
     Input::failed(Raised::at(joint, Fault::SampleMissing), None)
 }
 
 /// Ticks at the facing posture with one command each, then without; returns the last.
-fn drive(params: &TestParams, state: &mut TestState, commands: &[Command], ticks: usize) -> Output<f32, 12> {
+fn drive(params: &TestParams, state: &mut TestState, commands: &[Command], ticks: usize) -> Output<12> {
     let counts = facing_counts();
     for &command in commands {
         let output = tick(params, state, &Input::counts(&counts, Some(command)));
@@ -57,7 +57,7 @@ fn in_mode(params: &TestParams, mode: Mode) -> TestState {
     state
 }
 
-fn has_torque(output: &Output<f32, 12>) -> bool {
+fn has_torque(output: &Output<12>) -> bool {
     output.torques_nm.iter().any(|&torque| torque != 0.0)
 }
 
@@ -178,7 +178,7 @@ fn each_limit_shows_in_the_record() {
     config.supervisor.soft_start_ms = 0;
     let params = params(&config);
     let mut state = in_mode(&params, Mode::Armed);
-    let seen = |output: &Output<f32, 12>, limit| output.record.limiting.iter().any(|l| l.contains(limit));
+    let seen = |output: &Output<12>, limit| output.record.limiting.iter().any(|l| l.contains(limit));
     let output = tick(&params, &mut state, &Input::counts(&facing_counts(), Some(GRASP)));
     assert!(seen(&output, Limit::Slew));
     let output = drive(&params, &mut state, &[], 50);
@@ -195,7 +195,7 @@ fn each_limit_shows_in_the_record() {
 }
 
 #[track_caller]
-fn faulted(output: &Output<f32, 12>, joint: usize, fault: Fault) {
+fn faulted(output: &Output<12>, joint: usize, fault: Fault) {
     assert_eq!(output.record.fault, Some(Raised::at(joint, fault)));
     assert_eq!((output.record.mode, output.torques_nm), (Mode::Fault, [0.0; 12]));
     assert!(output.record.limiting.iter().all(|limiting| limiting.is_empty()));
@@ -346,7 +346,7 @@ fn records_are_numbered() {
 
 #[test]
 fn parameters_out_of_range_are_named_with_their_joint() {
-    let error = |change: fn(&mut Config<f32, 12>)| {
+    let error = |change: fn(&mut Config<12>)| {
         let mut config = config();
         change(&mut config);
         let error = TestParams::new(common::hand(), &config).unwrap_err();
@@ -358,8 +358,8 @@ fn parameters_out_of_range_are_named_with_their_joint() {
     assert_eq!(error(|c| c.law.damping_nm_s[7] = -1.0), ("damping_nm_s", Some(7)));
     assert_eq!(error(|c| c.limits.torque_nm = Some(with(1.0, 7, 0.0))), ("limits.torque_nm", Some(7)));
     assert_eq!(error(|c| c.limits.slew_nm_s = Some(with(1.0, 7, f32::NAN))), ("limits.slew_nm_s", Some(7)));
-    let stops = |change: fn(&mut blindgrasp_shared::limit::StopConfig<f32, 12>)| {
-        let mut config: Config<f32, 12> = config();
+    let stops = |change: fn(&mut blindgrasp_shared::limit::StopConfig<12>)| {
+        let mut config: Config<12> = config();
         change(config.limits.stops.as_mut().unwrap());
         let error = TestParams::new(common::hand(), &config).unwrap_err();
         (error.parameter, error.joint)
@@ -454,8 +454,8 @@ fn late_ticks_are_a_fault_and_the_fall_back_clock_does_not_arm() {
 }
 
 /// A hand without weight and stops, whose ledger may show so much excess.
-fn ledger_config(excess_j: f32) -> Config<f32, 12> {
-    let mut config: Config<f32, 12> = config();
+fn ledger_config(excess_j: f32) -> Config<12> {
+    let mut config: Config<12> = config();
     config.law.gravity_m_s2 = None;
     config.limits.stops = None;
     config.faults = FaultConfig { energy_j: Some(excess_j), ..FaultConfig::LEAST };
@@ -471,7 +471,7 @@ fn work_that_the_potentials_give_is_no_fault() {
     let mut counts = facing_counts();
     let mut output = drive(&params, &mut state, &[], 100);
     let first = output.record.clone();
-    let potential_j = |record: &Record<f32, 12>| record.approach_potential_j + record.attitude_potential_j;
+    let potential_j = |record: &Record<12>| record.approach_potential_j + record.attitude_potential_j;
     for _ in 0..60 {
         for (count, torque) in counts.iter_mut().zip(output.torques_nm) {
             *count += if torque > 0.0 { 7 } else { -7 };

@@ -64,7 +64,7 @@ pub struct Page {
     /// The plant's.
     pub books: Books,
     /// The controller's.
-    pub record: Record<f32, MAX_JOINTS>,
+    pub record: Record<MAX_JOINTS>,
 }
 
 /// A scene's grasp with its encoders and its output delay, tick by tick, as [`sim`] runs it.
@@ -72,7 +72,7 @@ pub struct Page {
 /// # Panics
 /// If the scene can't be simulated, has no encoders or a delay of more than a tick, or loses its grasp.
 pub fn keep(scene: &Scene) -> Vec<Page> {
-    let params: Params<f32, MAX_JOINTS, MAX_FINGERS> =
+    let params: Params<MAX_JOINTS, MAX_FINGERS> =
         Params::new(scene.hand.cast(), &scene.controller_config()).unwrap_or_else(|error| panic!("{error}"));
     assert!(scene.actuators.output_delay_ticks <= 1, "a tick of delay at most");
     let mut state = State::new();

@@ -72,8 +72,8 @@ pub struct Turned {
 
 /// The controller.
 struct Supervised {
-    params: Params<f32, MAX_JOINTS, MAX_FINGERS>,
-    state: State<f32, MAX_JOINTS, MAX_FINGERS>,
+    params: Params<MAX_JOINTS, MAX_FINGERS>,
+    state: State<MAX_JOINTS, MAX_FINGERS>,
     course: Course,
     /// None before the grasp.
     tick: Option<u64>,
@@ -163,7 +163,7 @@ impl Outcome {
 ///
 /// # Panics
 /// If the scene's hand has no firmware.
-pub fn config(scene: &Scene) -> Config<f32, MAX_JOINTS> {
+pub fn config(scene: &Scene) -> Config<MAX_JOINTS> {
     let firmware = HandModel::of(scene).unwrap_or_else(|error| panic!("{error}")).config;
     let mut config = scene.controller_config();
     config.faults.heartbeat_ms = firmware.faults.heartbeat_ms;
@@ -192,7 +192,7 @@ pub fn run(scene: &Scene, course: &Course) -> Outcome {
 ///
 /// # Panics
 /// If the scene can't be simulated.
-pub fn run_with(scene: &Scene, config: &Config<f32, MAX_JOINTS>, course: &Course) -> Outcome {
+pub fn run_with(scene: &Scene, config: &Config<MAX_JOINTS>, course: &Course) -> Outcome {
     let params = Params::new(scene.hand.cast(), config).unwrap_or_else(|error| panic!("{error}"));
     let controller =
         Supervised { params, state: State::new(), course: course.clone(), tick: None, turned: Vec::new() };

@@ -338,7 +338,7 @@ fn pushed_off(outcome: &Outcome, course: &Course, at: u64) -> End {
     End { off: off - at, fastest_rad_s: fastest_rad_s(outcome, off) }
 }
 
-fn changed(scene: &Scene, change: impl FnOnce(&mut Config<f32, MAX_JOINTS>)) -> Config<f32, MAX_JOINTS> {
+fn changed(scene: &Scene, change: impl FnOnce(&mut Config<MAX_JOINTS>)) -> Config<MAX_JOINTS> {
     let mut config = config(scene);
     config.faults.frozen = None;
     change(&mut config);

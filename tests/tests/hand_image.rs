@@ -224,7 +224,7 @@ fn dense_records_snapshots_and_the_burst_come_from_the_board() {
 
     assert_eq!(host.ask(telemetry(1, Signals::FULL)).refused(), None);
     let model = HandModel::load("three-finger").expect("it is built in");
-    let params = Params::<f32, MAX_JOINTS, MAX_FINGERS>::new(model.hand.cast(), &model.config);
+    let params = Params::<MAX_JOINTS, MAX_FINGERS>::new(model.hand.cast(), &model.config);
     let params = params.expect("its own configuration");
     let (mut listener, mut collector) = (Listener::<MAX_JOINTS>::new(), Collector::new());
     let (mut records, mut dense, mut snapshots): (Vec<Record>, _, _) = (Vec::new(), 0, Vec::new());

@@ -35,7 +35,7 @@ const JOINTS: usize = 12;
 /// Room for every payload here with its CRC.
 const ROOM: usize = 1024;
 
-type AnyRecord = Record<f32, J>;
+type AnyRecord = Record<J>;
 
 fn hex(bytes: &[u8]) -> String {
     bytes.iter().fold(String::new(), |mut text, byte| {
@@ -841,7 +841,7 @@ fn the_budget_of_the_document_is_that_of_the_code() {
         dense_bytes(worst) as f64,
     );
     row("full, of a grasp".into(), full as f64);
-    row("full, the longest there can be".into(), most_bytes(1 + Record::<f32, JOINTS>::MOST_BYTES) as f64);
+    row("full, the longest there can be".into(), most_bytes(1 + Record::<JOINTS>::MOST_BYTES) as f64);
     let words =
         format!("snapshots of a grasp: {} frames, {snapshot_bytes} bytes every 1000 ticks", snapshot.len());
     let snapshots = row(words, snapshot_bytes as f64 / 1000.0);

@@ -31,7 +31,7 @@ const HEARTBEAT_TICKS: u64 = 50;
 type Hand = Device<MAX_JOINTS, MAX_FINGERS>;
 
 enum Telemetry {
-    Record(Box<Record<f32, MAX_JOINTS>>, Signals),
+    Record(Box<Record<MAX_JOINTS>>, Signals),
     Part(Part),
 }
 
@@ -57,7 +57,7 @@ struct Line {
     listener: Listener<MAX_JOINTS>,
     collector: Collector,
     /// What the device did since it was looked at, for comparison.
-    computed: VecDeque<Record<f32, MAX_JOINTS>>,
+    computed: VecDeque<Record<MAX_JOINTS>>,
     heard: Heard,
 }
 
@@ -71,12 +71,12 @@ struct Heard {
     longest: usize,
     missing: u64,
     snapshots: u64,
-    last: Option<Record<f32, MAX_JOINTS>>,
+    last: Option<Record<MAX_JOINTS>>,
     decimations: Vec<u16>,
 }
 
 impl Line {
-    fn new(config: &Config<f32, MAX_JOINTS>, baud: f64) -> Self {
+    fn new(config: &Config<MAX_JOINTS>, baud: f64) -> Self {
         let scene = Scene::load("cube", &[]).expect("it is built in");
         let image = Image {
             interface_version: INTERFACE_VERSION,
@@ -289,7 +289,7 @@ impl Controller for Line {
 /// How hard the fingers are shaken, N m: five times as much loses the cube.
 const SHAKE_NM: f32 = 0.004;
 
-fn hand_config() -> Config<f32, MAX_JOINTS> {
+fn hand_config() -> Config<MAX_JOINTS> {
     let scene = Scene::load("cube", &[]).expect("it is built in");
     HandModel::of(&scene).expect("it has a firmware").config
 }
@@ -314,7 +314,7 @@ fn a_minute_of_a_shaken_grasp_fits_a_line_of_one_megabaud() {
 }
 
 /// Counts of joints that swing to and fro at up to so many rad/s, each at its own pace.
-fn swinging(config: &Config<f32, MAX_JOINTS>, tick: u64, speed_rad_s: f64) -> Reading<MAX_JOINTS> {
+fn swinging(config: &Config<MAX_JOINTS>, tick: u64, speed_rad_s: f64) -> Reading<MAX_JOINTS> {
     Reading::Counts(std::array::from_fn(|k| {
         let rate_1_s = 100.0 + 31.0 * k as f64;
         let angle_rad = speed_rad_s / rate_1_s * (rate_1_s * tick as f64 / 1000.0).sine_cosine().0;

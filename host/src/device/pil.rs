@@ -122,7 +122,7 @@ pub struct Plan {
     /// The scene's hand, with the configuration that its firmware starts with.
     pub hand: HandModel,
     /// What the firmware is to have before it arms.
-    params: Params<f32, MAX_JOINTS, MAX_FINGERS>,
+    params: Params<MAX_JOINTS, MAX_FINGERS>,
 }
 
 impl Plan {
@@ -147,7 +147,7 @@ impl Plan {
     ///
     /// # Errors
     /// The first that the controller refuses.
-    pub fn with_heartbeat(&self) -> Result<Params<f32, MAX_JOINTS, MAX_FINGERS>, ParameterError> {
+    pub fn with_heartbeat(&self) -> Result<Params<MAX_JOINTS, MAX_FINGERS>, ParameterError> {
         let mut config = *self.params.config();
         config.faults.heartbeat_ms = self.hand.config.faults.heartbeat_ms;
         Params::new(self.params.hand().clone(), &config)
@@ -250,7 +250,7 @@ pub struct Pilot<P> {
     peer: P,
     joint_count: usize,
     /// What the scene wants.
-    params: Params<f32, MAX_JOINTS, MAX_FINGERS>,
+    params: Params<MAX_JOINTS, MAX_FINGERS>,
     session: u16,
     sequence: u16,
     /// Ticks from one heartbeat to the next, if the peer wants any.

@@ -71,7 +71,7 @@ impl Twin {
     }
 
     /// What its tick remembers.
-    pub fn state(&self) -> &State<f32, MAX_JOINTS, MAX_FINGERS> {
+    pub fn state(&self) -> &State<MAX_JOINTS, MAX_FINGERS> {
         self.device.state()
     }
 }

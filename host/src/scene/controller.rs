@@ -68,7 +68,7 @@ impl Setup<'_> {
     }
 
     /// Everything that the tick needs.
-    pub(super) fn config(&self) -> Config<f32, MAX_JOINTS> {
+    pub(super) fn config(&self) -> Config<MAX_JOINTS> {
         let &Self { control, sensors, actuators, .. } = self;
         let stops = control.end_stops.then(|| StopConfig {
             margin_rad: self.each(stop_margin_rad),

@@ -31,7 +31,7 @@ pub struct HandModel {
     /// Names of the joints, in the hand's order.
     pub joint_names: Vec<String>,
     /// The controller's configuration; zero beyond the hand's joints.
-    pub config: Config<f32, MAX_JOINTS>,
+    pub config: Config<MAX_JOINTS>,
     /// What is odd but can be used, in words.
     pub warnings: Vec<String>,
 }
@@ -144,7 +144,7 @@ pub static HAND: Hand<f32, JOINTS, FINGERS> = match Hand::from_prepared({}, {}) 
 }};
 /// Its gains, limits and times.
 #[allow(clippy::approx_constant, clippy::excessive_precision)]
-pub static CONFIG: Config<f32, JOINTS> = {};
+pub static CONFIG: Config<JOINTS> = {};
 ",
             fingertips.len(),
             self.name,

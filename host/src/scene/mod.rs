@@ -200,7 +200,7 @@ impl Scene {
     }
 
     /// The configuration of the controller; zero beyond the hand's joints.
-    pub fn controller_config(&self) -> Config<f32, MAX_JOINTS> {
+    pub fn controller_config(&self) -> Config<MAX_JOINTS> {
         self.setup().config()
     }
 

@@ -24,7 +24,7 @@ use nalgebra::{Matrix3, Vector3};
 ";
 
 /// A configuration as a constant expression, for a hand of so many joints. What differs in a bit differs in a digit.
-pub fn config_source<const J: usize>(config: &Config<f32, J>, joints: usize) -> String {
+pub fn config_source<const J: usize>(config: &Config<J>, joints: usize) -> String {
     config.source(joints.min(J))
 }
 
@@ -112,21 +112,21 @@ structs! {
     impl [] PreparedJoint<f32> as PreparedJoint {
         parent bend offset_m from_link lower_rad upper_rad link first_moment_kg_m
     }
-    impl [] Encoder<f32> as Encoder { zero_count rad_per_count reversed }
-    impl [const J: usize] EstimatorConfig<f32, J> as EstimatorConfig { bandwidth_hz encoders }
+    impl [] Encoder as Encoder { zero_count rad_per_count reversed }
+    impl [const J: usize] EstimatorConfig<J> as EstimatorConfig { bandwidth_hz encoders }
     impl [const J: usize] GraspConfig<f32, J> as GraspConfig {
         force_n attitude_stiffness_nm integral_gain_nm_rad damping_nm_s gravity_m_s2
     }
-    impl [const J: usize] StopConfig<f32, J> as StopConfig { margin_rad stiffness_nm_rad damping_nm_s }
-    impl [const J: usize] LimitConfig<f32, J> as LimitConfig {
+    impl [const J: usize] StopConfig<J> as StopConfig { margin_rad stiffness_nm_rad damping_nm_s }
+    impl [const J: usize] LimitConfig<J> as LimitConfig {
         force_n attitude_stiffness_nm integral_gain_nm_rad torque_nm slew_nm_s stops
     }
-    impl [const J: usize] FrozenConfig<f32, J> as FrozenConfig { torque_nm neighbour_rad after_ms }
-    impl [const J: usize] FaultConfig<f32, J> as FaultConfig {
+    impl [const J: usize] FrozenConfig<J> as FrozenConfig { torque_nm neighbour_rad after_ms }
+    impl [const J: usize] FaultConfig<J> as FaultConfig {
         possible_speed_rad_s speed_limit_rad_s range_slack_rad saturated_ms frozen heartbeat_ms late_ticks energy_j
     }
     impl [] SupervisorConfig as SupervisorConfig { soft_start_ms release_ms }
-    impl [const J: usize] Config<f32, J> as Config { period_us estimator law limits faults supervisor }
+    impl [const J: usize] Config<J> as Config { period_us estimator law limits faults supervisor }
 }
 
 #[cfg(test)]

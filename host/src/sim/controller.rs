@@ -27,7 +27,7 @@ pub trait Controller {
 #[derive(Clone, Copy, Debug)]
 pub struct Turn<'a> {
     /// What is known of the joints; zero beyond the hand's.
-    pub sensed: Sensed<'a, f32, MAX_JOINTS>,
+    pub sensed: Sensed<'a, MAX_JOINTS>,
     /// Whether the tick before is to count as late.
     pub late: bool,
     /// What the user asks for.
@@ -67,9 +67,9 @@ pub struct Stepped {
 /// The tick alone, as the scene configures it: no link, and so nobody whose heartbeat could stop.
 #[derive(Clone, Debug)]
 pub struct Alone {
-    params: Params<f32, MAX_JOINTS, MAX_FINGERS>,
-    state: State<f32, MAX_JOINTS, MAX_FINGERS>,
-    record: Option<Record<f32, MAX_JOINTS>>,
+    params: Params<MAX_JOINTS, MAX_FINGERS>,
+    state: State<MAX_JOINTS, MAX_FINGERS>,
+    record: Option<Record<MAX_JOINTS>>,
 }
 
 impl Alone {
@@ -83,17 +83,17 @@ impl Alone {
     }
 
     /// Its parameters.
-    pub fn params(&self) -> &Params<f32, MAX_JOINTS, MAX_FINGERS> {
+    pub fn params(&self) -> &Params<MAX_JOINTS, MAX_FINGERS> {
         &self.params
     }
 
     /// What it remembers after its last tick.
-    pub fn state(&self) -> &State<f32, MAX_JOINTS, MAX_FINGERS> {
+    pub fn state(&self) -> &State<MAX_JOINTS, MAX_FINGERS> {
         &self.state
     }
 
     /// What its last tick did; `None` before the first.
-    pub fn record(&self) -> Option<&Record<f32, MAX_JOINTS>> {
+    pub fn record(&self) -> Option<&Record<MAX_JOINTS>> {
         self.record.as_ref()
     }
 }

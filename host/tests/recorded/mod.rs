@@ -20,8 +20,8 @@ use blindgrasp_shared::tick::{Config, Input, Params, State, tick};
 use std::f64::consts::TAU;
 use std::path::Path;
 
-pub(crate) type AnyRecord = Record<f32, MAX_JOINTS>;
-pub(crate) type AnyConfig = Config<f32, MAX_JOINTS>;
+pub(crate) type AnyRecord = Record<MAX_JOINTS>;
+pub(crate) type AnyConfig = Config<MAX_JOINTS>;
 
 /// Time of a tick, ns.
 pub(crate) const TICK_NS: u64 = 1_000_000;
@@ -297,7 +297,7 @@ pub(crate) fn simulation(
     signals: Signals,
     mut input: impl FnMut(u32) -> Option<(Told, Option<Command>)>,
 ) -> Vec<AnyRecord> {
-    let params: Params<f32, MAX_JOINTS, MAX_FINGERS> = Params::new(hand.model.hand.cast(), config).unwrap();
+    let params: Params<MAX_JOINTS, MAX_FINGERS> = Params::new(hand.model.hand.cast(), config).unwrap();
     let mut state = State::new();
     let mut writer = Writer::create(path, false).unwrap();
     let device = writer.add_device("hand");

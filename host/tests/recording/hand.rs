@@ -51,8 +51,7 @@ pub(crate) fn about(hand: &str) -> About {
 /// All parameters of a hand.
 pub(crate) fn settings(hand: &str) -> Vec<Setting> {
     let model = HandModel::load(hand).unwrap();
-    let params =
-        Params::<f32, MAX_JOINTS, { blindgrasp::MAX_FINGERS }>::new(model.hand.cast(), &model.config);
+    let params = Params::<MAX_JOINTS, { blindgrasp::MAX_FINGERS }>::new(model.hand.cast(), &model.config);
     Setting::all(&params.unwrap())
 }
 

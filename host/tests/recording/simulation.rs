@@ -65,7 +65,7 @@ fn the_state_can_be_had_from_the_snapshots() {
     recorder.finish().unwrap();
     let (entries, _, _) = read(&path);
     let params =
-        Params::<f32, MAX_JOINTS, MAX_FINGERS>::new(scene.hand.cast(), &scene.controller_config()).unwrap();
+        Params::<MAX_JOINTS, MAX_FINGERS>::new(scene.hand.cast(), &scene.controller_config()).unwrap();
     let mut collector = Collector::new();
     let mut found = 0;
     for entry in &entries {

@@ -12,25 +12,25 @@ use crate::telemetry::snapshot::{Loader, Saver, SnapshotError};
 
 /// Where faults begin, as a user says; `None` leaves one out.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct FaultConfig<T, const J: usize> {
+pub struct FaultConfig<const J: usize> {
     /// Speed that each joint can't reach, rad/s: a count that changes faster is wrong. The motor's no-load speed over
     /// the gear, with room.
-    pub possible_speed_rad_s: Option<[T; J]>,
+    pub possible_speed_rad_s: Option<[f32; J]>,
     /// Speed that each joint must not reach, rad/s. Not the difference of two counts but the filtered speed is meant.
-    pub speed_limit_rad_s: Option<[T; J]>,
+    pub speed_limit_rad_s: Option<[f32; J]>,
     /// How far a joint may be beyond its range, rad.
-    pub range_slack_rad: Option<T>,
+    pub range_slack_rad: Option<f32>,
     /// How long a torque may stay at its limit, ms.
     pub saturated_ms: Option<u32>,
     /// When a counter that stands still is not believed.
-    pub frozen: Option<FrozenConfig<T, J>>,
+    pub frozen: Option<FrozenConfig<J>>,
     /// How long the host's heartbeat may fail while the hand has torque, ms.
     pub heartbeat_ms: Option<u32>,
     /// How many ticks in a row may be late; on average one in ten.
     pub late_ticks: Option<u32>,
     /// Work that the joints may do in a second beyond the drop of the law's potentials, J (the excess of the
     /// [`ledger`](crate::ledger), which fades: of what was done a second ago, 1/e counts).
-    pub energy_j: Option<T>,
+    pub energy_j: Option<f32>,
 }
 
 /// When a counter that stands still is not believed. A joint may stand still for hours; and in a grasp, a closed chain
@@ -38,17 +38,17 @@ pub struct FaultConfig<T, const J: usize> {
 /// neighbours turn far, and its torque changes, and it does not move at all. Not never: the knee of a finger that is
 /// pushed to and fro stands still where its angle is at an extremum, and in a straight finger.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct FrozenConfig<T, const J: usize> {
+pub struct FrozenConfig<const J: usize> {
     /// Change of the torque since the last count that is too much for a joint that stands still, N m: well above its
     /// friction.
-    pub torque_nm: [T; J],
+    pub torque_nm: [f32; J],
     /// Turn of the joint before or after it since then, rad.
-    pub neighbour_rad: T,
+    pub neighbour_rad: f32,
     /// Shortest standstill that counts, ms.
     pub after_ms: u32,
 }
 
-impl<T: Real, const J: usize> FaultConfig<T, J> {
+impl<const J: usize> FaultConfig<J> {
     /// Only what can't be left out: missing samples and what is not finite.
     pub const LEAST: Self = Self {
         possible_speed_rad_s: None,
@@ -67,24 +67,24 @@ impl<T: Real, const J: usize> FaultConfig<T, J> {
     /// The first parameter that is out of its range.
     pub fn prepare<const F: usize>(
         &self,
-        hand: &Hand<T, J, F>,
-        estimator: &Estimator<T, J>,
+        hand: &Hand<f32, J, F>,
+        estimator: &Estimator<J>,
         period: Period,
-    ) -> Result<Watch<T, J>, ParameterError> {
+    ) -> Result<Watch<J>, ParameterError> {
         let joint_count = hand.joint_count().min(J);
         let mut joints = [JointWatch::OFF; J];
-        if self.frozen.is_some_and(|f| !(f.neighbour_rad > T::zero() && f.neighbour_rad.is_finite())) {
+        if self.frozen.is_some_and(|f| !(f.neighbour_rad > 0.0 && f.neighbour_rad.is_finite())) {
             let reason = "has to be positive";
             return Err(ParameterError { parameter: "faults.frozen_neighbour_rad", joint: None, reason });
         }
-        if self.range_slack_rad.is_some_and(|slack| !(slack >= T::zero() && slack.is_finite())) {
+        if self.range_slack_rad.is_some_and(|slack| !(slack >= 0.0 && slack.is_finite())) {
             let reason = "has to be zero or positive";
             return Err(ParameterError { parameter: "faults.range_slack_rad", joint: None, reason });
         }
         for (k, joint) in joints.iter_mut().enumerate().take(joint_count) {
-            let positive = |parameter, v: T| {
+            let positive = |parameter, v: f32| {
                 let reason = "has to be positive";
-                if v > T::zero() && v.is_finite() {
+                if v > 0.0 && v.is_finite() {
                     Ok(v)
                 } else {
                     Err(ParameterError { parameter, joint: Some(k), reason })
@@ -93,7 +93,7 @@ impl<T: Real, const J: usize> FaultConfig<T, J> {
             if let Some(speeds) = self.possible_speed_rad_s {
                 let speed = positive("faults.possible_speed_rad_s", speeds[k])?;
                 // A count more, because both ends of the tick are rounded to whole counts.
-                joint.change = Some(speed / estimator.rad_s(k) + T::one());
+                joint.change = Some(speed / estimator.rad_s(k) + 1.0);
             }
             if let Some(speeds) = self.speed_limit_rad_s {
                 joint.speed_rad_s = Some(positive("faults.speed_limit_rad_s", speeds[k])?);
@@ -106,7 +106,7 @@ impl<T: Real, const J: usize> FaultConfig<T, J> {
                 joint.range_rad = Some((lower - slack, upper + slack));
             }
         }
-        if self.energy_j.is_some_and(|energy| !(energy > T::zero() && energy.is_finite())) {
+        if self.energy_j.is_some_and(|energy| !(energy > 0.0 && energy.is_finite())) {
             let reason = "has to be positive";
             return Err(ParameterError { parameter: "faults.energy_j", joint: None, reason });
         }
@@ -134,7 +134,7 @@ impl<T: Real, const J: usize> FaultConfig<T, J> {
             frozen_ticks: ticks(self.frozen.map(|frozen| frozen.after_ms), "faults.frozen_ms")?,
             heartbeat_ticks: ticks(self.heartbeat_ms, "faults.heartbeat_ms")?,
             late_most: self.late_ticks.map(|ticks| ticks * LATE_WEIGHT),
-            neighbour_rad: self.frozen.map_or(T::zero(), |frozen| frozen.neighbour_rad),
+            neighbour_rad: self.frozen.map_or(0.0, |frozen| frozen.neighbour_rad),
             energy_j: self.energy_j,
         })
     }
@@ -147,23 +147,23 @@ const LATE_TICKS_MOST: u32 = 1000;
 
 /// The watch, prepared for the joints of one hand.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Watch<T, const J: usize> {
+pub struct Watch<const J: usize> {
     joint_count: usize,
-    joints: [JointWatch<T>; J],
+    joints: [JointWatch; J],
     saturated_ticks: Option<u32>,
     frozen_ticks: Option<u32>,
     heartbeat_ticks: Option<u32>,
-    neighbour_rad: T,
+    neighbour_rad: f32,
     late_most: Option<u32>,
-    energy_j: Option<T>,
+    energy_j: Option<f32>,
 }
 
 /// What the watch remembers from tick to tick.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Watched<T, const J: usize> {
+pub struct Watched<const J: usize> {
     /// For how many ticks each joint has been at its torque limit.
     saturated: [u32; J],
-    standstills: [Standstill<T>; J],
+    standstills: [Standstill; J],
     /// Ticks since the last heartbeat; at first there was none for ever.
     silent: u32,
     /// Late ticks, by weight.
@@ -185,41 +185,36 @@ pub enum Driven {
 
 /// For how long a counter has stood still.
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct Standstill<T> {
+struct Standstill {
     ticks: u32,
     /// Torque when it last moved, or when the force last changed, N m.
-    torque_nm: T,
+    torque_nm: f32,
     /// Where the neighbours were then, rad.
-    before_rad: T,
-    after_rad: T,
+    before_rad: f32,
+    after_rad: f32,
 }
 
 /// Where the faults of one joint begin.
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct JointWatch<T> {
+struct JointWatch {
     /// Change of the count in a tick.
-    change: Option<T>,
-    speed_rad_s: Option<T>,
-    range_rad: Option<(T, T)>,
+    change: Option<f32>,
+    speed_rad_s: Option<f32>,
+    range_rad: Option<(f32, f32)>,
     /// Change of torque that is too much for a joint that stands still, N m.
-    frozen_nm: Option<T>,
+    frozen_nm: Option<f32>,
     /// The joint that carries it.
     before: Option<usize>,
     /// A joint that it carries; of several, the last.
     after: Option<usize>,
 }
 
-impl<T: Real, const J: usize> Watched<T, J> {
+impl<const J: usize> Watched<J> {
     /// Nothing has happened yet.
     pub fn new() -> Self {
         Self {
             saturated: [0; J],
-            standstills: [Standstill {
-                ticks: 0,
-                torque_nm: T::zero(),
-                before_rad: T::zero(),
-                after_rad: T::zero(),
-            }; J],
+            standstills: [Standstill { ticks: 0, torque_nm: 0.0, before_rad: 0.0, after_rad: 0.0 }; J],
             silent: u32::MAX,
             late: 0,
             late_ticks: 0,
@@ -232,7 +227,7 @@ impl<T: Real, const J: usize> Watched<T, J> {
     }
 }
 
-impl<const J: usize> Watched<f32, J> {
+impl<const J: usize> Watched<J> {
     pub(crate) fn save(&self, joints: usize, to: &mut Saver<'_>) -> Result<(), BufferTooSmall> {
         for (&saturated, standstill) in self.saturated.iter().zip(&self.standstills).take(joints) {
             to.u32(saturated)?;
@@ -265,15 +260,15 @@ impl<const J: usize> Watched<f32, J> {
     }
 }
 
-impl<T: Real, const J: usize> Default for Watched<T, J> {
+impl<const J: usize> Default for Watched<J> {
     fn default() -> Self {
         Self::new()
     }
 }
 
-impl<T: Real, const J: usize> Watch<T, J> {
+impl<const J: usize> Watch<J> {
     /// The first joint whose motion is at fault, with the first of its faults.
-    pub fn motion(&self, motion: &Motion<T, J>) -> Option<Raised> {
+    pub fn motion(&self, motion: &Motion<J>) -> Option<Raised> {
         for k in 0..self.joint_count.min(J) {
             let fault =
                 self.joints[k].motion(motion.angles_rad[k], motion.speeds_rad_s[k], motion.count_changes[k]);
@@ -285,13 +280,13 @@ impl<T: Real, const J: usize> Watch<T, J> {
     }
 
     /// The first joint whose torque is not a finite number.
-    pub fn torques(&self, torques_nm: &[T; J]) -> Option<Raised> {
+    pub fn torques(&self, torques_nm: &[f32; J]) -> Option<Raised> {
         let joint = torques_nm.iter().take(self.joint_count).position(|torque| !torque.is_finite())?;
         Some(Raised::at(joint, Fault::NotFinite))
     }
 
     /// Counts for how many ticks each joint has been at its torque limit; the first that was for too long.
-    pub fn saturation(&self, watched: &mut Watched<T, J>, limiting: &[Limiting; J]) -> Option<Raised> {
+    pub fn saturation(&self, watched: &mut Watched<J>, limiting: &[Limiting; J]) -> Option<Raised> {
         for (ticks, limiting) in watched.saturated.iter_mut().zip(limiting) {
             *ticks = if limiting.contains(Limit::Torque) { ticks.saturating_add(1) } else { 0 };
         }
@@ -301,18 +296,18 @@ impl<T: Real, const J: usize> Watch<T, J> {
     }
 
     /// Counts the ticks since the last heartbeat; whether it fails.
-    pub fn heartbeat(&self, watched: &mut Watched<T, J>, heard: bool) -> bool {
+    pub fn heartbeat(&self, watched: &mut Watched<J>, heard: bool) -> bool {
         watched.silent = if heard { 0 } else { watched.silent.saturating_add(1) };
         self.silent(watched)
     }
 
     /// Whether the heartbeat fails.
-    pub fn silent(&self, watched: &Watched<T, J>) -> bool {
+    pub fn silent(&self, watched: &Watched<J>) -> bool {
         self.heartbeat_ticks.is_some_and(|longest| watched.silent > longest)
     }
 
     /// Counts late ticks; whether there were too many.
-    pub fn lateness(&self, watched: &mut Watched<T, J>, late: bool) -> Option<Raised> {
+    pub fn lateness(&self, watched: &mut Watched<J>, late: bool) -> Option<Raised> {
         watched.late_ticks = watched.late_ticks.saturating_add(u32::from(late));
         let most = self.late_most?;
         watched.late = if late {
@@ -325,7 +320,7 @@ impl<T: Real, const J: usize> Watch<T, J> {
     }
 
     /// Whether the ledger's excess is more than it may be.
-    pub fn energy(&self, excess_j: T) -> Option<Raised> {
+    pub fn energy(&self, excess_j: f32) -> Option<Raised> {
         let most = self.energy_j?;
         (!(excess_j <= most)).then_some(Raised::of_hand(Fault::TooMuchEnergy))
     }
@@ -333,9 +328,9 @@ impl<T: Real, const J: usize> Watch<T, J> {
     /// Looks for counters that stand still although their torque and a neighbour changed since they last moved.
     pub fn standstill(
         &self,
-        watched: &mut Watched<T, J>,
-        motion: &Motion<T, J>,
-        torques_nm: &[T; J],
+        watched: &mut Watched<J>,
+        motion: &Motion<J>,
+        torques_nm: &[f32; J],
         driven: Driven,
     ) -> Option<Raised> {
         let longest = self.frozen_ticks?;
@@ -343,7 +338,7 @@ impl<T: Real, const J: usize> Watch<T, J> {
         for k in 0..self.joint_count.min(J) {
             let (joint, standstill) = (&self.joints[k], &mut watched.standstills[k]);
             let angle_of = |neighbour: Option<usize>| {
-                neighbour.and_then(|k| motion.angles_rad.get(k)).copied().unwrap_or(T::zero())
+                neighbour.and_then(|k| motion.angles_rad.get(k)).copied().unwrap_or(0.0)
             };
             let (torque_nm, before_rad, after_rad) =
                 (torques_nm[k], angle_of(joint.before), angle_of(joint.after));
@@ -367,16 +362,16 @@ impl<T: Real, const J: usize> Watch<T, J> {
     }
 }
 
-impl<T: Real> JointWatch<T> {
+impl JointWatch {
     /// Everything is left out.
     const OFF: Self =
         Self { change: None, speed_rad_s: None, range_rad: None, frozen_nm: None, before: None, after: None };
 
-    fn motion(&self, angle_rad: T, speed_rad_s: T, count_change: u32) -> Option<Fault> {
+    fn motion(&self, angle_rad: f32, speed_rad_s: f32, count_change: u32) -> Option<Fault> {
         if !(angle_rad.is_finite() && speed_rad_s.is_finite()) {
             return Some(Fault::NotFinite);
         }
-        let change = T::from_i32(i32::try_from(count_change).unwrap_or(i32::MAX));
+        let change = count_change as f32;
         if self.change.is_some_and(|largest| change > largest) {
             return Some(Fault::CountJump);
         }
@@ -394,7 +389,7 @@ mod tests {
     use super::*;
 
     /// A watch over two joints in which everything is switched off.
-    const BLIND: Watch<f64, 2> = Watch {
+    const BLIND: Watch<2> = Watch {
         joint_count: 2,
         joints: [JointWatch::OFF; 2],
         saturated_ticks: None,
@@ -421,11 +416,11 @@ mod tests {
         assert_eq!(watch.motion(-1.001, 0.0, 0), Some(Fault::BeyondRange));
         assert_eq!(watch.motion(0.0, 20.001, 0), Some(Fault::Overspeed));
         assert_eq!(watch.motion(0.0, -20.001, 0), Some(Fault::Overspeed));
-        for bad in [f64::NAN, f64::INFINITY] {
+        for bad in [f32::NAN, f32::INFINITY] {
             assert_eq!(watch.motion(bad, 0.0, 0), Some(Fault::NotFinite));
             assert_eq!(watch.motion(0.0, bad, 0), Some(Fault::NotFinite));
         }
-        assert_eq!(JointWatch::<f64>::OFF.motion(1e9, 1e9, u32::MAX), None);
+        assert_eq!(JointWatch::OFF.motion(1e9, 1e9, u32::MAX), None);
     }
 
     #[test]
@@ -483,7 +478,7 @@ mod tests {
         let watch = Watch { energy_j: Some(0.5), ..BLIND };
         let found = Some(Raised::of_hand(Fault::TooMuchEnergy));
         assert_eq!([-9.0, 0.5].map(|excess_j| watch.energy(excess_j)), [None; 2]);
-        assert_eq!([0.501, f64::NAN].map(|excess_j| watch.energy(excess_j)), [found; 2]);
+        assert_eq!([0.501, f32::NAN].map(|excess_j| watch.energy(excess_j)), [found; 2]);
         assert_eq!(BLIND.energy(1e9), None);
     }
 
@@ -527,7 +522,7 @@ mod tests {
         // What a ramp puts on is no reason either; what comes on top of it is.
         assert_eq!(look(true, 0.0, 0.0, Ramp), None);
         for k in 0..1000 {
-            assert_eq!(look(false, 1e-3 * f64::from(k), 0.1, Ramp), None);
+            assert_eq!(look(false, 1e-3 * k as f32, 0.1, Ramp), None);
         }
         assert_eq!(look(false, 1.098, 0.1, Steadily), None);
         assert_eq!(look(false, 1.1, 0.1, Steadily), frozen);

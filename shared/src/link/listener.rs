@@ -9,7 +9,7 @@ use core::fmt;
 #[derive(Clone, Debug)]
 pub struct Listener<const J: usize> {
     /// The last record.
-    last: Option<Record<f32, J>>,
+    last: Option<Record<J>>,
     /// The last counts, which it may not have.
     counts: Counts<J>,
     /// Something is missing since: only a full record helps.

@@ -127,7 +127,7 @@ impl Signals {
     }
 }
 
-impl<const J: usize> Record<f32, J> {
+impl<const J: usize> Record<J> {
     /// Leaves out what is not among the signals.
     pub fn keep(&mut self, signals: Signals) {
         if !signals.contain(Signals::COUNTS) {
@@ -174,7 +174,7 @@ pub enum Reply<'a, const J: usize> {
         value: f32,
     },
     /// What a tick did.
-    Record(Record<f32, J>),
+    Record(Record<J>),
     /// To `Burst`.
     Burst {
         /// Number of the request.
@@ -184,7 +184,7 @@ pub enum Reply<'a, const J: usize> {
         /// How many there are.
         count: u16,
         /// The record; it is numbered by its tick.
-        record: Record<f32, J>,
+        record: Record<J>,
     },
     /// A part of a snapshot.
     Snapshot(Part),
@@ -226,7 +226,7 @@ impl<'a, const J: usize> Reply<'a, J> {
     pub const MOST_BYTES: usize = {
         let identity = 6 + Self::NAMES + 40;
         // Of a burst: with three numbers before it. A snapshot's part is shorter than an identity.
-        let record = 9 + Record::<f32, J>::MOST_BYTES;
+        let record = 9 + Record::<J>::MOST_BYTES;
         1 + if record > identity { record } else { identity }
     };
 

@@ -36,7 +36,7 @@ impl<const J: usize> Sender<J> {
     /// As [`Self::reply`].
     pub fn record<'b>(
         &mut self,
-        record: &Record<f32, J>,
+        record: &Record<J>,
         signals: Signals,
         buffer: &'b mut [u8],
     ) -> Result<&'b [u8], BufferTooSmall> {

@@ -48,7 +48,7 @@ pub enum Caught<const J: usize> {
         /// How many there are.
         count: u16,
         /// The one that was asked for.
-        record: Record<f32, J>,
+        record: Record<J>,
     },
 }
 
@@ -95,7 +95,7 @@ impl<const J: usize> Slot<J> {
         limiting: List::empty(Limiting::NONE),
     };
 
-    fn keep(&mut self, record: &Record<f32, J>) {
+    fn keep(&mut self, record: &Record<J>) {
         *self = Self {
             tick: record.tick,
             mode: record.mode,
@@ -119,7 +119,7 @@ impl<const J: usize> Slot<J> {
     }
 
     /// Numbered by its tick: it is one of all of them.
-    fn record(&self) -> Record<f32, J> {
+    fn record(&self) -> Record<J> {
         let refused =
             self.answer.checked_sub(REFUSED).and_then(|k| Refusal::ALL.get(usize::from(k))).copied();
         Record {
@@ -176,7 +176,7 @@ impl<const J: usize> Burst<J> {
     }
 
     /// Takes the record of a tick: one copy, at most.
-    pub fn take(&mut self, record: &Record<f32, J>) {
+    pub fn take(&mut self, record: &Record<J>) {
         if self.phase == Phase::Kept {
             if matches!(record.mode, Mode::Disarmed | Mode::Fault) {
                 return;

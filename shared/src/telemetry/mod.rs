@@ -33,8 +33,7 @@ pub(crate) const LAW: usize = 9;
 
 /// What one tick took in, decided and put out.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(bound(deserialize = "T: Default + Deserialize<'de>"))]
-pub struct Record<T, const J: usize> {
+pub struct Record<const J: usize> {
     /// Number of the record, one more from record to record, wrapping: what is missing was lost. The tick gives every
     /// tick a number; who sends fewer records numbers them anew.
     pub sequence: u32,
@@ -51,23 +50,23 @@ pub struct Record<T, const J: usize> {
     /// Why there are no counts, where the joints could not be read.
     pub reading_failed: Option<Raised>,
     /// The force `f_d` that acts in this tick, N.
-    pub force_n: T,
+    pub force_n: f32,
     /// The attitude stiffness `K_st` that acts in this tick, N m.
-    pub attitude_stiffness_nm: T,
+    pub attitude_stiffness_nm: f32,
     /// The gain `K_I` of the earlier law that acts in this tick, N m/rad.
-    pub integral_gain_nm_rad: T,
+    pub integral_gain_nm_rad: f32,
     /// Potential `V_s` of the approach, J.
-    pub approach_potential_j: T,
+    pub approach_potential_j: f32,
     /// Potential `V_st` of the attitudes, above its least value, J.
-    pub attitude_potential_j: T,
+    pub attitude_potential_j: f32,
     /// Potential `V_I` of the joints' turns since the grasp began, J.
-    pub integral_potential_j: T,
+    pub integral_potential_j: f32,
     /// Work of the motors since the last grasp began, J.
-    pub work_j: T,
+    pub work_j: f32,
     /// What the law's damping has taken in the same time, J.
-    pub damped_j: T,
+    pub damped_j: f32,
     /// Work of the motors beyond the drop of the law's potentials in the last second (fading), J.
-    pub excess_j: T,
+    pub excess_j: f32,
     /// How long the tick before took with reading and writing the joints, processor cycles; 0 where there is no counter.
     pub cycles: u32,
     /// Ticks that were late since the start.
@@ -79,7 +78,7 @@ pub struct Record<T, const J: usize> {
     /// Encoder counts, one a joint; empty where angles came from elsewhere, or not at all.
     pub counts: List<i32, J>,
     /// Torques of the next tick, N m, one a joint.
-    pub torques_nm: List<T, J>,
+    pub torques_nm: List<f32, J>,
     /// What limits each joint's torque.
     pub limiting: List<Limiting, J>,
 }
@@ -106,7 +105,7 @@ impl fmt::Display for DecodeError {
 
 impl core::error::Error for DecodeError {}
 
-impl<const J: usize> Record<f32, J> {
+impl<const J: usize> Record<J> {
     /// A record of nothing.
     pub const BLANK: Self = Self {
         sequence: 0,
@@ -227,7 +226,7 @@ mod tests {
     use std::string::String;
     use std::vec::Vec;
 
-    fn example<const J: usize>() -> Record<f32, J> {
+    fn example<const J: usize>() -> Record<J> {
         let mut limiting = [Limiting::NONE; J];
         limiting[1].insert(Limit::Torque);
         limiting[1].insert(Limit::UpperStop);
@@ -294,10 +293,10 @@ mod tests {
             "030000003f0000a0bf00000000", // torques
             "03000900",                   // limiting
         );
-        let mut buffer = [0; Record::<f32, 3>::MOST_BYTES];
+        let mut buffer = [0; Record::<3>::MOST_BYTES];
         assert_eq!(INTERFACE_VERSION, 4);
         assert_eq!(hex(example::<3>().encode(&mut buffer).unwrap()), golden);
-        let mut buffer = [0; Record::<f32, 32>::MOST_BYTES];
+        let mut buffer = [0; Record::<32>::MOST_BYTES];
         assert_eq!(hex(example::<32>().encode(&mut buffer).unwrap()), golden, "depends on the capacity");
     }
 
@@ -329,7 +328,7 @@ mod tests {
 
     #[test]
     fn the_largest_record_fits() {
-        let record = Record::<f32, 12> {
+        let record = Record::<12> {
             sequence: u32::MAX,
             tick: u32::MAX,
             cycles: u32::MAX,
@@ -349,30 +348,26 @@ mod tests {
             limiting: List::first_of([Limiting::NONE; 12], 12),
             ..example()
         };
-        let mut buffer = [0; Record::<f32, 12>::MOST_BYTES];
+        let mut buffer = [0; Record::<12>::MOST_BYTES];
         let length = record.encode(&mut buffer).unwrap().len();
         // The three counts of the lists take one byte each, not two.
-        assert_eq!(length + 3, Record::<f32, 12>::MOST_BYTES);
+        assert_eq!(length + 3, Record::<12>::MOST_BYTES);
         assert_eq!(record.encode(&mut [0; 100]), Err(BufferTooSmall));
     }
 
     #[test]
     fn what_is_no_record_is_refused() {
-        let mut buffer = [0; Record::<f32, 3>::MOST_BYTES];
+        let mut buffer = [0; Record::<3>::MOST_BYTES];
         let bytes = example::<3>().encode(&mut buffer).unwrap().to_vec();
         for length in 0..bytes.len() {
-            assert_eq!(Record::<f32, 3>::decode(&bytes[..length]), Err(DecodeError::Malformed));
+            assert_eq!(Record::<3>::decode(&bytes[..length]), Err(DecodeError::Malformed));
         }
         let longer = [&bytes[..], &[0]].concat();
-        assert_eq!(Record::<f32, 3>::decode(&longer), Err(DecodeError::TrailingBytes));
-        assert_eq!(
-            Record::<f32, 2>::decode(&bytes),
-            Err(DecodeError::Malformed),
-            "more joints than capacity"
-        );
+        assert_eq!(Record::<3>::decode(&longer), Err(DecodeError::TrailingBytes));
+        assert_eq!(Record::<2>::decode(&bytes), Err(DecodeError::Malformed), "more joints than capacity");
         let mut unknown_fault = bytes;
         unknown_fault[7] = 99;
-        assert_eq!(Record::<f32, 3>::decode(&unknown_fault), Err(DecodeError::Malformed));
+        assert_eq!(Record::<3>::decode(&unknown_fault), Err(DecodeError::Malformed));
     }
 
     fn answers() -> impl Strategy<Value = Option<Answer>> {
@@ -398,7 +393,7 @@ mod tests {
             counts in any::<[i32; 12]>(),
             torques in any::<[f32; 12]>(),
             limits in any::<[[bool; 4]; 12]>(),
-        ) -> Record<f32, 12> {
+        ) -> Record<12> {
             let limiting = limits.map(|bits| {
                 let mut limiting = Limiting::NONE;
                 Limit::ALL.into_iter().zip(bits).filter(|(_, on)| *on).for_each(|(limit, _)| limiting.insert(limit));
@@ -428,33 +423,33 @@ mod tests {
     proptest! {
         #[test]
         fn records_come_back_as_they_were_sent(record in records()) {
-            let mut buffer = [0; Record::<f32, 12>::MOST_BYTES];
+            let mut buffer = [0; Record::<12>::MOST_BYTES];
             let bytes = record.encode(&mut buffer).unwrap().to_vec();
-            let decoded = Record::<f32, 12>::decode(&bytes).unwrap();
+            let decoded = Record::<12>::decode(&bytes).unwrap();
             prop_assert_eq!(&decoded, &record);
-            let mut again = [0; Record::<f32, 12>::MOST_BYTES];
+            let mut again = [0; Record::<12>::MOST_BYTES];
             prop_assert_eq!(decoded.encode(&mut again).unwrap(), &bytes[..]);
         }
 
         #[test]
         fn any_bytes_decode_or_are_refused(bytes in proptest::collection::vec(any::<u8>(), 0..200)) {
             // What decodes encodes to a record that is the same: NaN compares by its bits.
-            if let Ok(record) = Record::<f32, 12>::decode(&bytes) {
-                let mut buffer = [0; Record::<f32, 12>::MOST_BYTES];
+            if let Ok(record) = Record::<12>::decode(&bytes) {
+                let mut buffer = [0; Record::<12>::MOST_BYTES];
                 let encoded = record.encode(&mut buffer).unwrap().to_vec();
-                let again = Record::<f32, 12>::decode(&encoded).unwrap();
-                let mut buffer = [0; Record::<f32, 12>::MOST_BYTES];
+                let again = Record::<12>::decode(&encoded).unwrap();
+                let mut buffer = [0; Record::<12>::MOST_BYTES];
                 prop_assert_eq!(again.encode(&mut buffer).unwrap(), &encoded[..]);
             }
         }
 
         #[test]
         fn damaged_records_decode_or_are_refused(record in records(), at in 0..100_usize, bits in 1..=255_u8) {
-            let mut buffer = [0; Record::<f32, 12>::MOST_BYTES];
+            let mut buffer = [0; Record::<12>::MOST_BYTES];
             let bytes = record.encode(&mut buffer).unwrap();
             let at = at % bytes.len();
             bytes[at] ^= bits;
-            let _ = Record::<f32, 12>::decode(bytes);
+            let _ = Record::<12>::decode(bytes);
         }
     }
 }

@@ -7,30 +7,29 @@ use crate::estimate::{Motion, Tracks};
 use crate::fault::{Raised, Watched};
 use crate::hand::Posture;
 use crate::ledger::Ledger;
-use crate::math::Real;
 use crate::supervisor::{Mode, Supervisor};
 use crate::telemetry::snapshot::{Loader, Saver, SnapshotError};
 
 /// Everything that the tick remembers.
 #[derive(Clone, Debug, PartialEq)]
-pub struct State<T, const J: usize, const F: usize> {
+pub struct State<const J: usize, const F: usize> {
     pub(super) ticks: u32,
-    pub(super) tracks: Tracks<T, J>,
-    pub(super) motion: Motion<T, J>,
+    pub(super) tracks: Tracks<J>,
+    pub(super) motion: Motion<J>,
     pub(super) supervisor: Supervisor,
-    pub(super) watched: Watched<T, J>,
+    pub(super) watched: Watched<J>,
     /// How firm this grasp is, when it is at its full force.
-    pub(super) grasp: Gains<T>,
+    pub(super) grasp: Gains<f32>,
     /// How the hand stood when the grasp began, while there is one.
-    pub(super) latch: Option<Latch<T, J, F>>,
+    pub(super) latch: Option<Latch<f32, J, F>>,
     /// Where everything was in the last tick with torque.
-    pub(super) posture: Posture<T, J, F>,
+    pub(super) posture: Posture<f32, J, F>,
     /// Torques of the last tick, N m.
-    pub(super) torques_nm: [T; J],
-    pub(super) ledger: Ledger<T, J>,
+    pub(super) torques_nm: [f32; J],
+    pub(super) ledger: Ledger<J>,
 }
 
-impl<T: Real, const J: usize, const F: usize> State<T, J, F> {
+impl<const J: usize, const F: usize> State<J, F> {
     /// Disarmed, before the first tick.
     pub fn new() -> Self {
         Self {
@@ -42,18 +41,18 @@ impl<T: Real, const J: usize, const F: usize> State<T, J, F> {
             grasp: Gains::none(),
             latch: None,
             posture: Posture::at_base(),
-            torques_nm: [T::zero(); J],
+            torques_nm: [0.0; J],
             ledger: Ledger::new(),
         }
     }
 
     /// Joint angles as the last tick saw them, rad.
-    pub fn angles_rad(&self) -> &[T; J] {
+    pub fn angles_rad(&self) -> &[f32; J] {
         &self.motion.angles_rad
     }
 
     /// Joint speeds as the last tick saw them, rad/s.
-    pub fn speeds_rad_s(&self) -> &[T; J] {
+    pub fn speeds_rad_s(&self) -> &[f32; J] {
         &self.motion.speeds_rad_s
     }
 
@@ -68,12 +67,12 @@ impl<T: Real, const J: usize, const F: usize> State<T, J, F> {
     }
 
     /// How the hand stood when the grasp began, while there is one.
-    pub fn latch(&self) -> Option<&Latch<T, J, F>> {
+    pub fn latch(&self) -> Option<&Latch<f32, J, F>> {
         self.latch.as_ref()
     }
 }
 
-impl<const J: usize, const F: usize> State<f32, J, F> {
+impl<const J: usize, const F: usize> State<J, F> {
     /// Writes all that the ticks to come depend on, and returns the part of the buffer that it takes up.
     ///
     /// # Errors
@@ -81,7 +80,7 @@ impl<const J: usize, const F: usize> State<f32, J, F> {
     /// always suffice.
     pub fn save<'b>(
         &self,
-        params: &Params<f32, J, F>,
+        params: &Params<J, F>,
         buffer: &'b mut [u8],
     ) -> Result<&'b mut [u8], BufferTooSmall> {
         let (joints, fingertips) = (params.hand.joint_count(), params.hand.fingertip_count());
@@ -109,7 +108,7 @@ impl<const J: usize, const F: usize> State<f32, J, F> {
     ///
     /// # Errors
     /// What is wrong with the bytes.
-    pub fn load(params: &Params<f32, J, F>, bytes: &[u8]) -> Result<Self, SnapshotError> {
+    pub fn load(params: &Params<J, F>, bytes: &[u8]) -> Result<Self, SnapshotError> {
         let mut from = Loader::new(bytes);
         let (joints, fingertips) = (from.u8()?, from.u8()?);
         let here = (params.hand.joint_count(), params.hand.fingertip_count());
@@ -138,7 +137,7 @@ impl<const J: usize, const F: usize> State<f32, J, F> {
     }
 }
 
-impl<T: Real, const J: usize, const F: usize> Default for State<T, J, F> {
+impl<const J: usize, const F: usize> Default for State<J, F> {
     fn default() -> Self {
         Self::new()
     }

@@ -27,32 +27,32 @@ pub(crate) const SLEW_NM_S: f64 = 100.0;
 /// Angles with which the fingertips face each other, rad.
 pub(crate) const FACING_RAD: [f64; 4] = [0.0, -0.5, 0.9, 0.8];
 
-fn vector<T: Real>(x: f64, y: f64, z: f64) -> Vector3<T> {
-    Vector3::new(x, y, z).map(T::from_f64)
+fn vector(x: f64, y: f64, z: f64) -> Vector3<f32> {
+    Vector3::new(x, y, z).map(|entry: f64| entry as f32)
 }
 
 /// The hand.
-pub(crate) fn hand<T: Real, const J: usize, const F: usize>() -> Hand<T, J, F> {
+pub(crate) fn hand<const J: usize, const F: usize>() -> Hand<f32, J, F> {
     let mut joints = Vec::new();
     let mut fingertips = Vec::new();
     let half_root_of_three = 0.866_025_403_784_438_6;
     for (c, s) in [(1.0, 0.0), (-0.5, half_root_of_three), (-0.5, -half_root_of_three)] {
         let first = joints.len();
         // Local axes of a finger: x away from the palm's axis, z out of the palm.
-        let azimuth = Matrix3::new(c, -s, 0.0, s, c, 0.0, 0.0, 0.0, 1.0).map(T::from_f64);
+        let azimuth = Matrix3::new(c, -s, 0.0, s, c, 0.0, 0.0, 0.0, 1.0).map(|entry: f64| entry as f32);
         let flexion = vector(0.0, -1.0, 0.0);
         let link = |mass: f64, centre: f64, inertia: f64| Link {
-            mass_kg: T::from_f64(mass),
+            mass_kg: mass as f32,
             mass_centre_m: vector(0.0, 0.0, centre),
-            inertia_kg_m2: Matrix3::identity() * T::from_f64(inertia),
+            inertia_kg_m2: Matrix3::identity() * inertia as f32,
         };
         let joint = |parent, z, axis, link| Joint {
             parent,
             offset_m: vector(0.0, 0.0, z),
             attitude: Matrix3::identity(),
             axis,
-            lower_rad: T::from_f64(-2.0),
-            upper_rad: T::from_f64(2.0),
+            lower_rad: -2.0,
+            upper_rad: 2.0,
             link,
         };
         joints.push(Joint {
@@ -63,62 +63,57 @@ pub(crate) fn hand<T: Real, const J: usize, const F: usize>() -> Hand<T, J, F> {
         joints.push(joint(Some(first), 0.0, flexion, link(0.038, 0.023, 1.3e-5)));
         joints.push(joint(Some(first + 1), 0.064, flexion, link(0.024, 0.035, 0.8e-5)));
         joints.push(joint(Some(first + 2), 0.064, flexion, link(0.054, 0.010, 0.4e-5)));
-        let (offset_m, radius_m) = (vector(0.0, 0.0, 0.030), T::from_f64(0.015));
+        let (offset_m, radius_m) = (vector(0.0, 0.0, 0.030), 0.015);
         fingertips.push(Fingertip { link: first + 3, offset_m, radius_m });
     }
     Hand::new(&joints, &fingertips).expect("the test's hand is a hand")
 }
 
 /// The gains of the paper's Table VII, and every limit and fault switched on.
-pub(crate) fn config<T: Real, const J: usize>() -> Config<T, J> {
-    let real = T::from_f64;
-    let encoder = Encoder { zero_count: 0, rad_per_count: real(1.0 / COUNTS_PER_RAD), reversed: false };
-    let mut damping_nm_s = [T::zero(); J];
+pub(crate) fn config<const J: usize>() -> Config<J> {
+    let encoder = Encoder { zero_count: 0, rad_per_count: 1.0 / COUNTS_PER_RAD as f32, reversed: false };
+    let mut damping_nm_s = [0.0; J];
     for (k, damping) in damping_nm_s.iter_mut().enumerate().take(JOINTS) {
-        *damping = real([4e-4, 4e-4, 3e-4, 2e-4][k % 4]);
+        *damping = [4e-4, 4e-4, 3e-4, 2e-4][k % 4];
     }
     Config {
         period_us: 1000,
-        estimator: EstimatorConfig { bandwidth_hz: real(100.0), encoders: [encoder; J] },
+        estimator: EstimatorConfig { bandwidth_hz: 100.0, encoders: [encoder; J] },
         law: GraspConfig {
-            force_n: real(5.0),
-            attitude_stiffness_nm: real(5e-3),
-            integral_gain_nm_rad: T::zero(),
+            force_n: 5.0,
+            attitude_stiffness_nm: 5e-3,
+            integral_gain_nm_rad: 0.0,
             damping_nm_s,
             gravity_m_s2: Some(vector(0.0, 0.0, -9.81)),
         },
         limits: LimitConfig {
-            force_n: Some(real(500.0)),
-            attitude_stiffness_nm: Some(real(0.1)),
-            integral_gain_nm_rad: Some(real(1.0)),
-            torque_nm: Some([real(TORQUE_NM); J]),
-            slew_nm_s: Some([real(SLEW_NM_S); J]),
+            force_n: Some(500.0),
+            attitude_stiffness_nm: Some(0.1),
+            integral_gain_nm_rad: Some(1.0),
+            torque_nm: Some([TORQUE_NM as f32; J]),
+            slew_nm_s: Some([SLEW_NM_S as f32; J]),
             stops: Some(StopConfig {
-                margin_rad: [real(0.1); J],
-                stiffness_nm_rad: [real(2.0); J],
-                damping_nm_s: [real(0.01); J],
+                margin_rad: [0.1; J],
+                stiffness_nm_rad: [2.0; J],
+                damping_nm_s: [0.01; J],
             }),
         },
         faults: FaultConfig {
-            possible_speed_rad_s: Some([real(200.0); J]),
-            speed_limit_rad_s: Some([real(20.0); J]),
-            range_slack_rad: Some(real(0.05)),
+            possible_speed_rad_s: Some([200.0; J]),
+            speed_limit_rad_s: Some([20.0; J]),
+            range_slack_rad: Some(0.05),
             saturated_ms: Some(200),
-            frozen: Some(FrozenConfig {
-                torque_nm: [real(0.02); J],
-                neighbour_rad: real(0.03),
-                after_ms: 50,
-            }),
+            frozen: Some(FrozenConfig { torque_nm: [0.02; J], neighbour_rad: 0.03, after_ms: 50 }),
             heartbeat_ms: None,
             late_ticks: Some(3),
-            energy_j: Some(real(1.0)),
+            energy_j: Some(1.0),
         },
         supervisor: SupervisorConfig { soft_start_ms: 100, release_ms: 100 },
     }
 }
 
 /// The hand with a configuration.
-pub(crate) fn params<T: Real, const J: usize, const F: usize>(config: &Config<T, J>) -> Params<T, J, F> {
+pub(crate) fn params<const J: usize, const F: usize>(config: &Config<J>) -> Params<J, F> {
     Params::new(hand(), config).expect("the test's parameters are good")
 }
 

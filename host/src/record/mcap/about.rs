@@ -128,7 +128,7 @@ pub struct Setting {
 
 impl Setting {
     /// All parameters of a controller.
-    pub fn all<const J: usize, const F: usize>(params: &Params<f32, J, F>) -> Vec<Self> {
+    pub fn all<const J: usize, const F: usize>(params: &Params<J, F>) -> Vec<Self> {
         let joints = params.hand().joint_count();
         let each = |&parameter: &Parameter| {
             let count = match parameter.each() {
@@ -143,7 +143,7 @@ impl Setting {
     }
 
     /// Takes over the bandwidth of the estimator.
-    pub(super) fn configure(&self, config: &mut Config<f32, MAX_JOINTS>) {
+    pub(super) fn configure(&self, config: &mut Config<MAX_JOINTS>) {
         if let (Parameter::EstimatorBandwidth, Some(value)) = (self.parameter, self.value) {
             config.estimator.bandwidth_hz = value;
         }

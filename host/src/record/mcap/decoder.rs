@@ -15,7 +15,7 @@ use blindgrasp_shared::tick::Config;
 use std::f32::consts::PI;
 
 /// A record of a hand of any size.
-pub type Record = telemetry::Record<f32, MAX_JOINTS>;
+pub type Record = telemetry::Record<MAX_JOINTS>;
 
 /// After how many time constants of its filter a speed is told: an error of the start has faded to 1e-7 then.
 const SETTLED: f32 = 8.0;
@@ -116,9 +116,9 @@ pub(super) struct Track {
     device: usize,
     about: Option<About>,
     /// Of the hand, where its file is known.
-    config: Option<Config<f32, MAX_JOINTS>>,
+    config: Option<Config<MAX_JOINTS>>,
     estimator: Option<Prepared>,
-    tracks: Tracks<f32, MAX_JOINTS>,
+    tracks: Tracks<MAX_JOINTS>,
     /// Records until the speed is told.
     unsettled: u32,
     listener: Listener<MAX_JOINTS>,
@@ -260,7 +260,7 @@ impl Track {
             return;
         };
         let mut estimator = config.estimator;
-        let highest_hz = 1.0 / (PI * period.seconds::<f32>());
+        let highest_hz = 1.0 / (PI * period.seconds());
         // Just below, so that rounding does not put it above.
         estimator.bandwidth_hz = estimator.bandwidth_hz.min(0.999 * highest_hz);
         let settling = (SETTLED * highest_hz / estimator.bandwidth_hz).ceil() as u32;
@@ -276,5 +276,5 @@ struct Prepared {
     every: u16,
     /// Records until its speed is told.
     settling: u32,
-    estimator: Estimator<f32, MAX_JOINTS>,
+    estimator: Estimator<MAX_JOINTS>,
 }

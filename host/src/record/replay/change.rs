@@ -92,7 +92,7 @@ impl Change {
     /// Puts it into a configuration, without looking at the others.
     pub(super) fn apply(
         &self,
-        config: &mut Config<f32, MAX_JOINTS>,
+        config: &mut Config<MAX_JOINTS>,
         joint_names: &[String],
     ) -> Result<(), ChangeError> {
         let names: Vec<&str> = match self.parameter.each() {
@@ -136,7 +136,7 @@ mod tests {
     use super::*;
     use crate::scene::HandModel;
 
-    fn changed(texts: &[&str]) -> Result<Config<f32, MAX_JOINTS>, String> {
+    fn changed(texts: &[&str]) -> Result<Config<MAX_JOINTS>, String> {
         let hand = HandModel::load("three-finger").unwrap();
         let mut config = hand.config;
         for text in texts {

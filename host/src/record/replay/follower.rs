@@ -22,7 +22,7 @@ const PENDING: usize = 4096;
 /// Gaps that are listed; all are counted.
 const LISTED: usize = 100;
 
-type AnyState = State<f32, MAX_JOINTS, MAX_FINGERS>;
+type AnyState = State<MAX_JOINTS, MAX_FINGERS>;
 
 /// A replay under way.
 pub struct Follower {
@@ -66,7 +66,7 @@ pub struct Follower {
 
 /// Parameters, as recorded and changed.
 struct Controller {
-    config: Config<f32, MAX_JOINTS>,
+    config: Config<MAX_JOINTS>,
     recorded: AnyParams,
     changed: Option<AnyParams>,
 }
@@ -230,7 +230,7 @@ impl Follower {
     }
 
     /// Takes another configuration, if it is another.
-    fn configure(&mut self, config: Config<f32, MAX_JOINTS>) -> Result<(), ReplayError> {
+    fn configure(&mut self, config: Config<MAX_JOINTS>) -> Result<(), ReplayError> {
         let Some(model) = &self.model else { return Ok(()) };
         if self.controller.as_ref().is_some_and(|controller| controller.config == config) {
             return Ok(());

@@ -9,7 +9,7 @@ use blindgrasp_shared::hand::Hand;
 use blindgrasp_shared::tick::{Config, Params};
 
 /// The parameters of a controller of any hand.
-pub(super) type AnyParams = Params<f32, MAX_JOINTS, MAX_FINGERS>;
+pub(super) type AnyParams = Params<MAX_JOINTS, MAX_FINGERS>;
 
 /// A hand, as its firmware has it.
 #[derive(Clone, Debug)]
@@ -19,7 +19,7 @@ pub(super) struct Model {
     pub(super) joint_names: Vec<String>,
     hand: Hand<f32, MAX_JOINTS, MAX_FINGERS>,
     /// The configuration that the firmware starts with.
-    config: Config<f32, MAX_JOINTS>,
+    config: Config<MAX_JOINTS>,
 }
 
 impl Model {
@@ -47,9 +47,9 @@ impl Model {
     /// A configuration, or the one that the firmware starts with, with recorded parameters.
     pub(super) fn config(
         &self,
-        before: Option<&Config<f32, MAX_JOINTS>>,
+        before: Option<&Config<MAX_JOINTS>>,
         settings: &[Setting],
-    ) -> Result<Config<f32, MAX_JOINTS>, ReplayError> {
+    ) -> Result<Config<MAX_JOINTS>, ReplayError> {
         let mut config = *before.unwrap_or(&self.config);
         for &Setting { parameter, index, value } in settings {
             let put = config.put(self.joint_names.len(), parameter, index, value);
@@ -59,14 +59,14 @@ impl Model {
     }
 
     /// A controller of this configuration.
-    pub(super) fn params(&self, config: &Config<f32, MAX_JOINTS>) -> Result<AnyParams, ReplayError> {
+    pub(super) fn params(&self, config: &Config<MAX_JOINTS>) -> Result<AnyParams, ReplayError> {
         Params::new(self.hand.clone(), config).map_err(ReplayError::Parameters)
     }
 
     /// A controller of this configuration, changed.
     pub(super) fn changed(
         &self,
-        config: &Config<f32, MAX_JOINTS>,
+        config: &Config<MAX_JOINTS>,
         changes: &[Change],
     ) -> Result<AnyParams, ReplayError> {
         let mut config = *config;
@@ -104,7 +104,7 @@ mod tests {
         let recorded = Model::new(&about, None).unwrap();
         let mut configs = vec![model.config];
         // Everything that can be switched is on in the hand's file: off, in turns.
-        let change = |change: fn(&mut Config<f32, MAX_JOINTS>)| {
+        let change = |change: fn(&mut Config<MAX_JOINTS>)| {
             let mut config = model.config;
             config.law.force_n = 4.0;
             config.law.damping_nm_s[7] = 0.125;

@@ -35,7 +35,7 @@ impl<const J: usize> Counts<J> {
     }
 
     /// Takes those of a record, if it has some.
-    pub(crate) fn take(&mut self, record: &Record<f32, J>) {
+    pub(crate) fn take(&mut self, record: &Record<J>) {
         if !record.counts.is_empty() {
             *self = Self { counts: record.counts, sequence: record.sequence };
         }
@@ -46,9 +46,9 @@ impl<const J: usize> Counts<J> {
 /// record and its digest.
 pub(crate) fn read<const J: usize>(
     bytes: &[u8],
-    before: &Record<f32, J>,
+    before: &Record<J>,
     counts_before: &Counts<J>,
-) -> Result<(Record<f32, J>, u16), Undecoded> {
+) -> Result<(Record<J>, u16), Undecoded> {
     let mut body = Body(bytes);
     if body.byte()? != TAG {
         return Err(Undecoded::Bytes(DecodeError::Malformed));

@@ -69,7 +69,7 @@ impl<const J: usize> Encoder<J> {
     }
 
     /// Takes the next record that is sent: what its dense form is made of, or `None` where it has to be sent in full.
-    pub(crate) fn next(&mut self, record: &Record<f32, J>, signals: Signals) -> Option<Shape> {
+    pub(crate) fn next(&mut self, record: &Record<J>, signals: Signals) -> Option<Shape> {
         let law = halves(record);
         let Record { late_ticks, dropped, .. } = *record;
         if self.full_tick.is_none() {
@@ -140,7 +140,7 @@ impl<const J: usize> Encoder<J> {
 /// # Errors
 /// Those of `put`.
 pub(crate) fn write<E, const J: usize>(
-    record: &Record<f32, J>,
+    record: &Record<J>,
     Shape { nibbles, law, sent }: Shape,
     mut put: impl FnMut(u8) -> Result<(), E>,
 ) -> Result<(), E> {

@@ -56,7 +56,7 @@ impl Hash {
 }
 
 /// What the law, the ledger and the limits computed, to the bit: 16 bits of a hash of their nine numbers and all torques.
-pub fn digest<const J: usize>(record: &Record<f32, J>) -> u16 {
+pub fn digest<const J: usize>(record: &Record<J>) -> u16 {
     let mut hash = Hash::START;
     record.law().into_iter().chain(record.torques_nm.iter().copied()).for_each(|v| hash.add(v.to_bits()));
     (hash.0 >> 16) as u16
@@ -64,7 +64,7 @@ pub fn digest<const J: usize>(record: &Record<f32, J>) -> u16 {
 
 /// Whether the record was put together rightly: 8 bits of a hash of numbers, of law and ledger as they are sent, and of
 /// counts.
-fn check<const J: usize>(record: &Record<f32, J>, law: &[u16; LAW]) -> u8 {
+fn check<const J: usize>(record: &Record<J>, law: &[u16; LAW]) -> u8 {
     let mut hash = Hash::START;
     let numbers =
         [record.sequence, record.tick, record.late_ticks, record.dropped, u32::from(record.decimation)];
@@ -75,7 +75,7 @@ fn check<const J: usize>(record: &Record<f32, J>, law: &[u16; LAW]) -> u8 {
 }
 
 /// What law and ledger tell, as it is sent.
-fn halves<const J: usize>(record: &Record<f32, J>) -> [u16; LAW] {
+fn halves<const J: usize>(record: &Record<J>) -> [u16; LAW] {
     record.law().map(|number| f16::from_f32_const(number).to_bits())
 }
 
@@ -95,7 +95,7 @@ fn told_cycles(cycles: u32) -> u16 {
 }
 
 /// What the dense form of a record tells of it. A record with an answer has no dense form: here it loses it.
-pub fn quantised<const J: usize>(record: &Record<f32, J>) -> Record<f32, J> {
+pub fn quantised<const J: usize>(record: &Record<J>) -> Record<J> {
     let joint = |raised: Raised| Raised { joint: raised.joint.filter(|&joint| joint != NO_JOINT), ..raised };
     let mut torques_nm = record.torques_nm;
     torques_nm.iter_mut().for_each(|torque| *torque = half(*torque));
