@@ -41,11 +41,10 @@
 //! Counts are subtracted as integers, with wrap-around, before anything becomes a float: what the filter keeps are
 //! small numbers, however far the counters have run.
 
-use crate::buffer::BufferTooSmall;
+use crate::bytes::{BufferTooSmall, Loader, Saver, SnapshotError};
 use crate::math::Real;
 use crate::parameter::ParameterError;
 use crate::period::Period;
-use crate::telemetry::snapshot::{Loader, Saver, SnapshotError};
 
 /// How the counts of one joint are read.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

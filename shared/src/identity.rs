@@ -1,6 +1,6 @@
 //! What a firmware is, and how its microcontroller started: told on `Hello`, and found in an image before it is flashed.
 
-use crate::buffer::BufferTooSmall;
+use crate::bytes::BufferTooSmall;
 use core::fmt;
 use serde::{Deserialize, Serialize};
 

@@ -30,10 +30,9 @@
 //! millions of entries. The excess fades: of what was done a second ago 1/e counts. It cannot lose digits, and it does not let
 //! an hour of damping make up for a second of swing.
 
-use crate::buffer::BufferTooSmall;
+use crate::bytes::{BufferTooSmall, Loader, Saver, SnapshotError};
 use crate::control::{Gains, Monitor};
 use crate::estimate::Motion;
-use crate::telemetry::snapshot::{Loader, Saver, SnapshotError};
 
 /// What a tick enters.
 #[derive(Clone, Copy, Debug)]

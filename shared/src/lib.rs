@@ -12,7 +12,7 @@
 #[cfg(test)]
 extern crate std;
 
-pub mod buffer;
+pub mod bytes;
 pub mod command;
 pub mod control;
 pub mod device;

@@ -27,12 +27,11 @@
 //!
 //! In a tick, a fault that is there comes first, then the command, then the end of a release.
 
-use crate::buffer::BufferTooSmall;
+use crate::bytes::{BufferTooSmall, Loader, Saver, SnapshotError};
 use crate::command::{Answer, Command, Refusal};
 use crate::fault::{Fault, Raised, Reaction};
 use crate::parameter::ParameterError;
 use crate::period::Period;
-use crate::telemetry::snapshot::{Loader, Saver, SnapshotError};
 use serde::{Deserialize, Serialize};
 
 /// A mode.

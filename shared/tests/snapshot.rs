@@ -2,12 +2,13 @@
 
 mod common;
 
+use blindgrasp_shared::bytes::SnapshotError;
 use blindgrasp_shared::command::{Command, Grasp};
 use blindgrasp_shared::event::{Event, Events};
 use blindgrasp_shared::fault::{Fault, Raised};
 use blindgrasp_shared::supervisor::Mode;
 use blindgrasp_shared::telemetry::Record;
-use blindgrasp_shared::telemetry::snapshot::{BYTES_PER_JOINT, SnapshotError};
+use blindgrasp_shared::telemetry::snapshot::BYTES_PER_JOINT;
 use blindgrasp_shared::tick::{Input, Output, Params, State, tick};
 use common::{JOINTS, config, facing_counts, params};
 use proptest::prelude::*;

@@ -22,12 +22,11 @@
 //!   bounded for every `K_st`, and the condition of Eq. 49 is a sizing rule only.
 
 use super::integral::pull_back;
-use crate::buffer::BufferTooSmall;
+use crate::bytes::{BufferTooSmall, Loader, Saver, SnapshotError};
 use crate::hand::frame::{dot, product_transposed};
 use crate::hand::{Hand, Posture, Wrench};
 use crate::math::Real;
 use crate::parameter::ParameterError;
-use crate::telemetry::snapshot::{Loader, Saver, SnapshotError};
 use nalgebra::{Matrix3, Vector3};
 
 /// Gains of the grasp law, as a user gives them.

@@ -1,14 +1,13 @@
 //! The watch: where faults begin, and what it has seen so far.
 
 use super::{Fault, Raised};
-use crate::buffer::BufferTooSmall;
+use crate::bytes::{BufferTooSmall, Loader, Saver, SnapshotError};
 use crate::estimate::{Estimator, Motion};
 use crate::hand::Hand;
 use crate::limit::{Limit, Limiting};
 use crate::math::Real;
 use crate::parameter::ParameterError;
 use crate::period::Period;
-use crate::telemetry::snapshot::{Loader, Saver, SnapshotError};
 
 /// Where faults begin, as a user says; `None` leaves one out.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -3,7 +3,7 @@
 
 use super::checksum::Checksum;
 use super::{END, FULL};
-use crate::buffer::BufferTooSmall;
+use crate::bytes::BufferTooSmall;
 use postcard::ser_flavors::Flavor;
 use serde::Serialize;
 

@@ -2,7 +2,7 @@
 
 use super::frame::{Writer, encode};
 use super::message::{Reply, Signals};
-use crate::buffer::BufferTooSmall;
+use crate::bytes::BufferTooSmall;
 use crate::telemetry::Record;
 use crate::telemetry::dense::{self, Encoder};
 

@@ -15,7 +15,7 @@ pub mod snapshot;
 
 pub use list::List;
 
-use crate::buffer::BufferTooSmall;
+use crate::bytes::BufferTooSmall;
 use crate::command::{Answer, Command};
 use crate::event::Events;
 use crate::fault::Raised;

@@ -1,14 +1,13 @@
 //! What the tick remembers, and its bytes.
 
 use super::Params;
-use crate::buffer::BufferTooSmall;
+use crate::bytes::{BufferTooSmall, Loader, Saver, SnapshotError};
 use crate::control::{Gains, Latch};
 use crate::estimate::{Motion, Tracks};
 use crate::fault::{Raised, Watched};
 use crate::hand::Posture;
 use crate::ledger::Ledger;
 use crate::supervisor::{Mode, Supervisor};
-use crate::telemetry::snapshot::{Loader, Saver, SnapshotError};
 
 /// Everything that the tick remembers.
 #[derive(Clone, Debug, PartialEq)]

@@ -1,7 +1,7 @@
 //! Frames that nothing happened to, and bytes that are hard for COBS.
 
 use crate::property::{self, CAPACITY, LONGEST, Raw, frame, receive, stuff, with_crc};
-use blindgrasp_shared::buffer::BufferTooSmall;
+use blindgrasp_shared::bytes::BufferTooSmall;
 use blindgrasp_shared::link::{self, Counters, FrameError, Receiver};
 use proptest::prelude::*;
 use serde::Serialize;

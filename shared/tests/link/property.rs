@@ -4,7 +4,7 @@
 //! The receiver is compared with a second one that is as plain as possible: it has the whole frame, allocates, and
 //! computes the CRC bit by bit.
 
-use blindgrasp_shared::buffer::BufferTooSmall;
+use blindgrasp_shared::bytes::BufferTooSmall;
 use blindgrasp_shared::link::{self, Counters, FrameError, Receiver};
 use serde::ser::{Serialize, SerializeTuple, Serializer};
 
