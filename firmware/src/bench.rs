@@ -13,7 +13,7 @@ use crate::link::MOST_SENT;
 use crate::model::{FINGERS, JOINTS, params};
 use crate::semihosting::File;
 use blindgrasp_shared::command::{Command, Grasp};
-use blindgrasp_shared::control::{GraspConfig, Latch};
+use blindgrasp_shared::control::{Latch, LawsConfig, Stance};
 use blindgrasp_shared::device::Reading;
 use blindgrasp_shared::fault::Raised;
 use blindgrasp_shared::hand::Posture;
@@ -127,9 +127,10 @@ pub fn run(timer: &mut SYST, control: &mut Control) -> Result<(), &'static str> 
     let counter = Counter::new(timer);
     let params = params();
     let mut figures = Figures::default();
-    figures.law_gravity_on = law(&counter, &params, &params.config().law)?;
-    figures.law_gravity_off =
-        law(&counter, &params, &GraspConfig { gravity_m_s2: None, ..params.config().law })?;
+    figures.law_gravity_on = law(&counter, &params, &params.config().laws)?;
+    let mut without = params.config().laws;
+    without.hold.gravity_m_s2 = None;
+    figures.law_gravity_off = law(&counter, &params, &without)?;
     whole_tick(&counter, &params, control, &mut figures)?;
     print(&figures)
 }
@@ -138,10 +139,10 @@ pub fn run(timer: &mut SYST, control: &mut Control) -> Result<(), &'static str> 
 fn law(
     counter: &Counter,
     params: &HandParams,
-    config: &GraspConfig<f32, JOINTS>,
+    config: &LawsConfig<f32, JOINTS>,
 ) -> Result<u32, &'static str> {
     let hand = params.hand();
-    let law = config.prepare(hand).map_err(|_| "the law could not be prepared")?;
+    let laws = config.prepare(hand).map_err(|_| "the law could not be prepared")?;
     let mut joints = Swinging { params, tick: 0 };
     let mut posture = Posture::at_base();
     hand.forward_kinematics(&joints.angles_rad(), &mut posture);
@@ -153,8 +154,8 @@ fn law(
         let angles_rad = joints.angles_rad();
         most = most.max(counter.instructions(|| {
             hand.forward_kinematics(black_box(&angles_rad), &mut posture);
-            let grip = law.grip(&latch);
-            black_box(law.torques(hand, &posture, &angles_rad, black_box(&speeds_rad_s), Some(grip)));
+            let stance = Stance { hand, posture: &posture, angles_rad: &angles_rad };
+            black_box(laws.torques(&stance, black_box(&speeds_rad_s), Some(&laws.grip(&latch))));
         }));
     }
     Ok(most)

@@ -194,6 +194,7 @@ mod tests {
             clock: Clock::Emulated,
             reset: ResetCause::Unknown,
             crash: None,
+            changed: 0,
         };
         let inputs = Inputs {
             reading: Reading::Counts([0; JOINTS]),

@@ -5,7 +5,7 @@ use blindgrasp::scene::Scene;
 use blindgrasp::sim::{self, Simulation};
 use blindgrasp::{MAX_JOINTS, Posture};
 use blindgrasp_shared::command::{Command, Grasp};
-use blindgrasp_shared::control::{GraspConfig, Latch};
+use blindgrasp_shared::control::{Chosen, Hold, Latch, LawsConfig, Stance};
 use blindgrasp_shared::estimate::{Encoder, EstimatorConfig};
 use blindgrasp_shared::fault::FaultConfig;
 use blindgrasp_shared::hand::{Hand, Posture as PostureOf};
@@ -33,13 +33,14 @@ fn hand(scene: &Scene) -> Hand<f32, J, F> {
     scene.hand.fit().expect("twelve joints and three fingers").cast()
 }
 
-fn gains(scene: &Scene) -> GraspConfig<f32, J> {
-    GraspConfig {
-        force_n: scene.control.force_n as f32,
-        attitude_stiffness_nm: scene.control.attitude_stiffness_nm as f32,
-        integral_gain_nm_rad: scene.control.integral_gain_nm_rad as f32,
-        damping_nm_s: std::array::from_fn(|k| scene.joints[k].damping_gain_nm_s_rad as f32),
-        gravity_m_s2: Some(Vector3::new(0.0, 0.0, -9.81)),
+fn laws(scene: &Scene) -> LawsConfig<f32, J> {
+    LawsConfig {
+        gains: scene.control.gains.map(|&gain| gain as f32),
+        chosen: Chosen::ALL,
+        hold: Hold {
+            damping_nm_s: std::array::from_fn(|k| scene.joints[k].damping_gain_nm_s_rad as f32),
+            gravity_m_s2: Some(Vector3::new(0.0, 0.0, -9.81)),
+        },
     }
 }
 
@@ -49,8 +50,8 @@ fn angles(scene: &Scene) -> [f32; J] {
 
 fn controller(criterion: &mut Criterion) {
     let scene = cube();
-    let (hand, gains, angles) = (hand(&scene), gains(&scene), angles(&scene));
-    let law = gains.prepare(&hand).expect("gains");
+    let (hand, config, angles) = (hand(&scene), laws(&scene), angles(&scene));
+    let laws = config.prepare(&hand).expect("gains");
     let mut posture = PostureOf::at_base();
     hand.forward_kinematics(&angles, &mut posture);
     let latch = Latch::of(&posture, &angles);
@@ -59,8 +60,11 @@ fn controller(criterion: &mut Criterion) {
         bencher.iter(|| hand.forward_kinematics(black_box(&angles), &mut posture));
     });
     criterion.bench_function("law with gravity (f32, 12 joints)", |bencher| {
-        let grip = law.grip(&latch);
-        bencher.iter(|| law.torques(&hand, black_box(&posture), &angles, black_box(&speeds), Some(grip)));
+        let grip = laws.grip(&latch);
+        bencher.iter(|| {
+            let stance = Stance { hand: &hand, posture: black_box(&posture), angles_rad: &angles };
+            laws.torques(&stance, black_box(&speeds), Some(&grip))
+        });
     });
 
     let per_turn = scene.joints[0].encoder_counts_per_turn;
@@ -68,7 +72,7 @@ fn controller(criterion: &mut Criterion) {
     let config = Config {
         period_us: 1000,
         estimator: EstimatorConfig { bandwidth_hz: 50.0, encoders: [encoder; J] },
-        law: gains,
+        laws: config,
         limits: LimitConfig {
             torque_nm: Some([1.3878; J]),
             slew_nm_s: Some([1000.0; J]),
@@ -154,12 +158,12 @@ fn plant(criterion: &mut Criterion) {
         angles[..scene.start.angles_rad.len()].copy_from_slice(&scene.start.angles_rad);
         let start = Motion::at_rest(angles, scene.start.position_m, scene.start.attitude);
         let begin = || Plant::new(sim::model(&scene), start, scene.plant.substep_s).expect("a plant");
-        let law = sim::law(&scene).expect("gains");
+        let laws = sim::laws(&scene).expect("gains");
         let mut posture = Posture::at_base();
         scene.hand.forward_kinematics(&angles, &mut posture);
         let latch = Latch::of(&posture, &angles);
-        let grip = law.grip(&latch);
-        let (torques, _) = law.torques(&scene.hand, &posture, &angles, &[0.0; MAX_JOINTS], Some(grip));
+        let stance = Stance { hand: &scene.hand, posture: &posture, angles_rad: &angles };
+        let (torques, _) = laws.torques(&stance, &[0.0; MAX_JOINTS], Some(&laws.grip(&latch)));
         let mut plant = begin();
         let mut steps = 0;
         criterion.bench_function(&format!("plant step ({what})"), |bencher| {

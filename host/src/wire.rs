@@ -4,6 +4,7 @@ use crate::MAX_JOINTS;
 use blindgrasp_shared::command::Refusal;
 use blindgrasp_shared::identity::{Clock, Crash, Identity, ResetCause};
 use blindgrasp_shared::link::message;
+use blindgrasp_shared::parameters::Setting;
 use blindgrasp_shared::telemetry::{self, INTERFACE_VERSION};
 
 /// A request with its session and number.
@@ -67,7 +68,7 @@ pub enum Answer {
     /// It was refused.
     Refused(Refusal),
     /// To `GetParameter`.
-    Value(f32),
+    Value(Setting),
     /// To `Burst`.
     Burst {
         /// How many records there are.

@@ -11,7 +11,7 @@ use blindgrasp_shared::fault::{Fault, Raised};
 use blindgrasp_shared::identity::{Clock, Crash, CrashKind, Identity, Image, ResetCause, UNITS};
 use blindgrasp_shared::link::message::Reply;
 use blindgrasp_shared::link::{Receiver, encode, most_bytes};
-use blindgrasp_shared::settings::Parameter;
+use blindgrasp_shared::parameters::Parameter;
 use blindgrasp_shared::supervisor::Mode;
 use blindgrasp_shared::telemetry::INTERFACE_VERSION;
 use blindgrasp_shared::telemetry::burst::Burst;
@@ -58,7 +58,8 @@ impl Board {
             file_hash: 0,
         };
         let clock = Clock::External;
-        let identity = Identity { image, units: UNITS, clock, reset: ResetCause::Pin, crash: Some(crash) };
+        let identity =
+            Identity { image, units: UNITS, clock, reset: ResetCause::Pin, crash: Some(crash), changed: 0 };
         // A finger: abduction, and three knuckles that bend.
         let mut counts = [0; MAX_JOINTS];
         for (k, count) in counts.iter_mut().enumerate().take(hand.hand.joint_count()) {
@@ -191,7 +192,7 @@ fn the_heartbeat_is_kept_and_without_it_the_hand_lets_go() {
 #[test]
 fn a_heartbeat_that_is_set_is_kept_from_then_on() {
     let mut bench = Bench::open();
-    let parameter = Parameter::HeartbeatTime;
+    let parameter = Parameter::HEARTBEAT_TIME;
     bench.talk.ask(Request::SetParameter { parameter, index: 0, value: 30.0 }, bench.now);
     bench.run(100).unwrap();
     bench.command(Command::Arm);
@@ -224,7 +225,7 @@ fn faults_and_modes_are_told_when_they_happen_and_once() {
 fn a_few_requests_are_asked_at_a_time_and_a_stop_overtakes() {
     let mut bench = Bench::open();
     let gets: Vec<Request> =
-        (0..9).map(|index| Request::GetParameter { parameter: Parameter::Damping, index }).collect();
+        (0..9).map(|index| Request::GetParameter { parameter: Parameter::DAMPING, index }).collect();
     for request in &gets {
         bench.talk.ask(request.clone(), bench.now);
     }
@@ -253,7 +254,7 @@ fn a_few_requests_are_asked_at_a_time_and_a_stop_overtakes() {
 #[test]
 fn what_is_asked_aside_waits_for_the_user_and_is_answered_aside() {
     let mut bench = Bench::open();
-    let get = |index| Request::GetParameter { parameter: Parameter::Damping, index };
+    let get = |index| Request::GetParameter { parameter: Parameter::DAMPING, index };
     for index in 0..12 {
         bench.talk.ask_aside(get(index), bench.now);
     }
@@ -311,7 +312,7 @@ fn what_gets_lost_is_told_but_a_stop_is_sent_again() {
     bench.command(Command::Arm);
     bench.run(100).unwrap();
     bench.events.clear();
-    bench.talk.ask(Request::GetParameter { parameter: Parameter::Force, index: 0 }, bench.now);
+    bench.talk.ask(Request::GetParameter { parameter: Parameter::gain(0), index: 0 }, bench.now);
     bench.command(Command::Stop);
     // A byte of everything that is sent in this millisecond is another.
     bench
@@ -326,7 +327,7 @@ fn what_gets_lost_is_told_but_a_stop_is_sent_again() {
     assert!(bench.has_seen(&done(Command::Stop)));
     assert_eq!(bench.board.mode, Mode::Disarmed);
     bench.run(1000).unwrap();
-    let request = Request::GetParameter { parameter: Parameter::Force, index: 0 };
+    let request = Request::GetParameter { parameter: Parameter::gain(0), index: 0 };
     assert!(bench.has_seen(&Event::Unanswered(request)));
 }
 
@@ -604,7 +605,10 @@ mod command {
         let (output, said, _) = type_all(Board::new(), "get\nhelp\n");
         assert_eq!(output.status.code(), Some(0));
         for parameter in Parameter::ALL {
-            assert!(said.lines().any(|line| line.starts_with(parameter.key())), "{parameter}:\n{said}");
+            assert!(
+                said.lines().any(|line| line.starts_with(&parameter.to_string())),
+                "{parameter}:\n{said}"
+            );
         }
         assert_lines(&said, &["gravity_m_s2[2] = -9.8", "help ", "quit ", "stop: done"]);
     }

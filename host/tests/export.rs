@@ -4,7 +4,7 @@
 
 mod recorded;
 
-use blindgrasp::record::export::{Cell, Column};
+use blindgrasp::record::export::{Cell, Column, Row};
 use blindgrasp::record::mcap::{Decoded, Decoder, Recording};
 use blindgrasp_shared::command::{Command, Grasp};
 use blindgrasp_shared::fault::{Fault, Raised};
@@ -101,7 +101,7 @@ fn csv_has_every_record_and_every_value() {
     let mut missing = 0;
     for (row, decoded) in rows.iter().zip(&decoded) {
         for (column, field) in columns.iter().zip(row) {
-            let cell = column.cell(decoded, start_ns, &names);
+            let cell = column.cell(&Row::of(decoded.clone(), start_ns, names.len()), &names);
             missing += u32::from(cell == Cell::Missing);
             assert!(is_told(&cell, field), "{}: {cell:?}, {field}", column.name);
         }

@@ -6,7 +6,7 @@
 use blindgrasp::record::mcap::{Decoded, Decoder, Recording, Stamp, What};
 use blindgrasp_shared::fault::Fault;
 use blindgrasp_shared::link::message::Reply;
-use blindgrasp_shared::settings::Parameter;
+use blindgrasp_shared::parameters::Parameter;
 use blindgrasp_shared::supervisor::Mode;
 use blindgrasp_shared::telemetry::snapshot::Collector;
 use nix::sys::signal::{Signal, kill};

@@ -8,12 +8,13 @@ use blindgrasp::MAX_JOINTS;
 use blindgrasp::record::mcap::{Decoder, Recording};
 use blindgrasp::record::replay::{Reason, ReplayError, Report, Wanted, replay};
 use blindgrasp_shared::command::{Command, Grasp};
+use blindgrasp_shared::control::PerGain;
 use blindgrasp_shared::device::Reading;
 use blindgrasp_shared::fault::{Fault, Raised};
 use blindgrasp_shared::limit::{Limit, LimitConfig};
 use blindgrasp_shared::link::message::Signals;
 use blindgrasp_shared::math::Real;
-use blindgrasp_shared::settings::Parameter;
+use blindgrasp_shared::parameters::Parameter;
 use blindgrasp_shared::supervisor::Mode;
 use blindgrasp_shared::tick::{Params, State};
 use recorded::{AnyRecord, Fate, Hand, Session, Told, simulation};
@@ -69,7 +70,7 @@ fn a_whole_session_gives_the_same_bits() {
     let (_folder, path) = folder();
     let mut session = armed(&path);
     session.run(500);
-    let firm = Grasp { force_n: Some(3.0), ..Grasp::CONFIGURED };
+    let firm = Grasp { gains: PerGain { grasp: [Some(3.0), None], ..PerGain::all(None) } };
     assert_eq!(session.command(Command::Grasp(firm)).mode, Mode::Grasping);
     session.run(1500);
     // Late ticks, fewer than are a fault; a command that is refused.
@@ -167,17 +168,17 @@ fn parameters_that_change_are_taken_over_with_the_next_snapshot() {
     let mut session = armed(&path);
     session.run(200);
     // Refused, for the hand is armed: nothing changes, and nothing is lost.
-    session.set(Parameter::Damping, 2, 0.125);
+    session.set(Parameter::DAMPING, 2, 0.125);
     session.run(400);
     session.command(Command::Disarm);
     session.run(10);
-    session.set(Parameter::Force, 0, 7.0);
-    session.set(Parameter::Damping, 2, 0.125);
+    session.set(Parameter::gain(0), 0, 7.0);
+    session.set(Parameter::DAMPING, 2, 0.125);
     session.run(1100);
     session.command(Command::Arm);
     assert_eq!(session.command(Command::Grasp(Grasp::CONFIGURED)).mode, Mode::Grasping);
     session.run(1000);
-    assert_eq!(session.pass().force_n, 7.0);
+    assert_eq!(session.pass().gains.grasp[0], 7.0);
     let sent = session.sent;
     session.finish();
 
@@ -252,7 +253,7 @@ fn damping_makes_the_difference_that_the_law_says() {
     let (_folder, path) = folder();
     let (hand, config, records) = unlimited(&path, 4000);
     // In Eq. 30, damping is a torque -C dq by itself: of another C, nothing differs but that.
-    let change_nm_s = 0.02 - f64::from(config.law.damping_nm_s[4]);
+    let change_nm_s = 0.02 - f64::from(config.laws.hold.damping_nm_s[4]);
     let estimator =
         Params::<MAX_JOINTS, { blindgrasp::MAX_FINGERS }>::new(hand.model.hand.cast(), &config).unwrap();
     let mut tracks = blindgrasp_shared::estimate::Tracks::new();
@@ -354,7 +355,7 @@ fn what_cannot_be_replayed_says_why() {
     for (arguments, words) in [
         (["--set", "dampng_nm_s=1"], "did you mean `damping_nm_s`?"),
         (["--set", "damping_nm_s=-1"], "damping_nm_s"),
-        (["--set", "limits.force_n=1"], "force_n has to be at most limits.force_n"),
+        (["--set", "limits.force_n=1"], "force_n has to be at most its limit"),
         (["--device", "hand7"], "there is no `hand7` in the recording; it has hand"),
         (["--from", "-1"], "--from"),
     ] {

@@ -3,6 +3,7 @@
 //! Every command gets an [`Answer`] in the record of the tick that took it: done, or refused with a named reason.
 //! Which command is taken in which mode is the table in [`supervisor`](crate::supervisor).
 
+use crate::control::{GAIN_COUNT, PerGain};
 use core::fmt;
 use serde::{Deserialize, Serialize};
 
@@ -23,26 +24,21 @@ pub enum Command {
     ClearFault,
 }
 
-/// How firmly to grasp; what is left out is as configured.
+/// How firmly to grasp; a gain that is left out is as configured.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Grasp {
-    /// Nominal grasping force `f_d`, N.
-    pub force_n: Option<f32>,
-    /// Stiffness `K_st` of the relative attitudes, N m.
-    pub attitude_stiffness_nm: Option<f32>,
-    /// Gain `K_I` of the earlier law's integral of each joint's velocity, N m/rad.
-    pub integral_gain_nm_rad: Option<f32>,
+    /// The gains that are asked for.
+    pub gains: PerGain<Option<f32>>,
 }
 
 impl Grasp {
     /// As configured.
-    pub const CONFIGURED: Self =
-        Self { force_n: None, attitude_stiffness_nm: None, integral_gain_nm_rad: None };
+    pub const CONFIGURED: Self = Self { gains: PerGain::all(None) };
 }
 
 impl Command {
     /// Bytes that suffice for every command.
-    pub const MOST_BYTES: usize = 1 + 3 * (1 + 4);
+    pub const MOST_BYTES: usize = 1 + GAIN_COUNT * (1 + 4);
 
     /// Every command.
     pub const ALL: [Self; 6] = [
@@ -112,7 +108,17 @@ refusals! {
     JointsAreReal      = "this image has real joints: only the image `pil` takes them over the link";
     NoBurst            = "no fault was caught since the hand was last armed";
     BurstNotOver       = "the records after the fault are still being taken: ask again in a moment";
+    LawNotChosen       = "the law of this gain is not chosen: set its parameter `laws.` to 1, disarmed";
+    BeyondFile         = "this is looser than the hand's file, and the line can only tighten: `get` shows what the file says";
 }
+
+impl fmt::Display for Refusal {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.words())
+    }
+}
+
+impl core::error::Error for Refusal {}
 
 /// What became of a command.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]

@@ -159,7 +159,8 @@ impl<const J: usize, const F: usize> Device<J, F> {
                     sequence,
                     understood: interface_version == INTERFACE_VERSION,
                 };
-                let (session, identity) = (self.session.number, self.identity);
+                let identity = Identity { changed: self.params.changed(), ..self.identity };
+                let session = self.session.number;
                 return Asked::Answered(Reply::Identity { sequence, session, identity });
             }
             Request::Command(Command::Stop) => {
@@ -180,7 +181,7 @@ impl<const J: usize, const F: usize> Device<J, F> {
                 answer(self.params.set(parameter, index, value).err())
             }
             Request::GetParameter { parameter, index } => match self.params.get(parameter, index) {
-                Ok(value) => Asked::Answered(Reply::Value { sequence, parameter, index, value }),
+                Ok(setting) => Asked::Answered(Reply::Value { sequence, parameter, index, setting }),
                 Err(refusal) => answer(Some(refusal)),
             },
             Request::Telemetry { decimation, signals } => {

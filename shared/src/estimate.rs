@@ -72,7 +72,9 @@ impl<const J: usize> EstimatorConfig<J> {
     /// # Errors
     /// The first parameter that is out of its range.
     pub fn prepare(&self, joint_count: usize, period: Period) -> Result<Estimator<J>, ParameterError> {
-        let fail = |parameter, joint, reason| Err(ParameterError { parameter, joint, reason });
+        let fail = |parameter: &'static str, joint, reason| {
+            Err(ParameterError { parameter: parameter.into(), joint, reason })
+        };
         let period_s: f32 = period.seconds();
         let w = core::f32::consts::PI * self.bandwidth_hz * period_s;
         if !(1e-3..=1.0).contains(&w) {
@@ -452,7 +454,8 @@ mod tests {
                 encoders: [encoder, Encoder { rad_per_count, ..encoder }],
             };
             let error = config.prepare(2, period).unwrap_err();
-            assert_eq!((error.parameter, error.joint), ("estimator.rad_per_count", Some(1)));
+            assert_eq!(error.parameter, "estimator.rad_per_count");
+            assert_eq!(error.joint, Some(1));
             assert!(config.prepare(1, period).is_ok(), "unused capacity is not checked");
         }
     }

@@ -19,6 +19,15 @@ impl Event {
     /// Every event.
     pub const ALL: [Self; 3] = [Self::Heartbeat, Self::Late, Self::FallbackClock];
 
+    /// Its name in recordings and tables.
+    pub const fn key(self) -> &'static str {
+        match self {
+            Self::Heartbeat => "heartbeat",
+            Self::Late => "late",
+            Self::FallbackClock => "fallback_clock",
+        }
+    }
+
     /// In words.
     pub const fn words(self) -> &'static str {
         match self {

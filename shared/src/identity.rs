@@ -89,6 +89,9 @@ pub struct Identity<'a> {
     pub reset: ResetCause,
     /// How it ended before, if that was not in order.
     pub crash: Option<Crash>,
+    /// The parameters that differ from the hand's file: a bit for each, by its
+    /// [number](crate::parameters::Parameter::number).
+    pub changed: u64,
 }
 
 /// What gives a microcontroller its time.

@@ -17,8 +17,8 @@
 //! potentials rise, and the work is what they take. Nor is a motor or an encoder the wrong way round, which looks the same;
 //! or an encoder of the wrong scale, since both sides of the balance are reckoned from it.
 //!
-//! - `V` is `V_s + V_st + V_I`, less the potential energy of the links' weight that the law holds. Each but the last
-//!   is its gain times a function of the posture. Gains that change (soft start, release) give and take potential
+//! - `V` is the sum of the potentials of the laws' gains, less the potential energy of the links' weight that is held. Each
+//!   but the last is its gain times a function of the posture. Gains that change (soft start, release) give and take potential
 //!   without any work: the drop is taken at the gains of the tick before.
 //! - **Turns** are those of the counts themselves: the filter's angles are late. Over a way they err by a count in all,
 //!   however long it is.
@@ -31,7 +31,7 @@
 //! an hour of damping make up for a second of swing.
 
 use crate::bytes::{BufferTooSmall, Loader, Saver, SnapshotError};
-use crate::control::{Gains, Monitor};
+use crate::control::{Account, PerGain};
 use crate::estimate::Motion;
 
 /// What a tick enters.
@@ -41,21 +41,10 @@ pub struct Entry<'a, const J: usize> {
     pub motion: &'a Motion<J>,
     /// Torques of the tick before, N m.
     pub last_nm: &'a [f32; J],
-    /// What the law does in this tick; `None` without torque.
-    pub law: Option<Doing>,
+    /// What the laws do in this tick; `None` without torque.
+    pub law: Option<Account<f32>>,
     /// The tick period, s.
     pub period_s: f32,
-}
-
-/// The law in a tick.
-#[derive(Clone, Copy, Debug)]
-pub struct Doing {
-    /// Gains that act.
-    pub gains: Gains<f32>,
-    /// Potentials at these gains.
-    pub monitor: Monitor<f32>,
-    /// Power that the damping takes, W.
-    pub damping_w: f32,
 }
 
 /// What is remembered from tick to tick.
@@ -63,8 +52,10 @@ pub struct Doing {
 pub struct Ledger<const J: usize> {
     /// Torques of the tick before the last, N m.
     before_nm: [f32; J],
-    /// The law in the last tick.
-    terms: [Term; 4],
+    /// The laws in the last tick.
+    terms: PerGain<Term>,
+    /// The weight that was held.
+    weight: Term,
     work: Sum,
     damped: Sum,
     excess_j: f32,
@@ -82,17 +73,7 @@ impl Term {
         Self { gain, potential_j }
     }
 
-    /// Those of the law. The weight is held or not.
-    fn all(law: Option<Doing>) -> [Self; 4] {
-        let zero = 0.0;
-        let Some(Doing { gains, monitor, .. }) = law else { return [Self::new(zero, zero); 4] };
-        [
-            Self::new(gains.force_n, monitor.approach_potential_j),
-            Self::new(gains.attitude_stiffness_nm, monitor.attitude_potential_j),
-            Self::new(gains.integral_gain_nm_rad, monitor.integral_potential_j),
-            Self::new(1.0, -monitor.weight_potential_j),
-        ]
-    }
+    const NONE: Self = Self::new(0.0, 0.0);
 
     /// By how much the potential has fallen since `before`, at the gain that it had then. A term that acted not before, or
     /// acts no more, gives nothing.
@@ -127,7 +108,8 @@ impl<const J: usize> Ledger<J> {
     pub fn new() -> Self {
         Self {
             before_nm: [0.0; J],
-            terms: Term::all(None),
+            terms: PerGain::all(Term::NONE),
+            weight: Term::NONE,
             work: Sum::zero(),
             damped: Sum::zero(),
             excess_j: 0.0,
@@ -146,12 +128,17 @@ impl<const J: usize> Ledger<J> {
         }
         work *= half;
         self.work.add(work);
-        let terms = Term::all(entry.law);
-        let pairs = terms.iter().zip(&self.terms);
+        // The weight is held or not: its gain is one.
+        let (terms, weight) = entry.law.as_ref().map_or((PerGain::all(Term::NONE), Term::NONE), |law| {
+            let terms =
+                law.gains.zip_with(&law.potentials_j, |&gain, &potential_j| Term { gain, potential_j });
+            (terms, Term::new(1.0, -law.weight_potential_j))
+        });
+        let pairs = terms.iter().chain([&weight]).zip(self.terms.iter().chain([&self.weight]));
         let drop = pairs.fold(0.0, |drop, (now, before)| drop + now.drop_since(before));
-        self.terms = terms;
+        (self.terms, self.weight) = (terms, weight);
         match entry.law {
-            Some(Doing { damping_w, .. }) => {
+            Some(Account { damping_w, .. }) => {
                 self.damped.add(damping_w * entry.period_s);
                 // A first-order fade with a time constant of one second.
                 self.excess_j += work - drop - self.excess_j * entry.period_s;
@@ -186,7 +173,7 @@ impl<const J: usize> Ledger<J> {
 impl<const J: usize> Ledger<J> {
     pub(crate) fn save(&self, joints: usize, to: &mut Saver<'_>) -> Result<(), BufferTooSmall> {
         to.f32s(&self.before_nm, joints)?;
-        for term in &self.terms {
+        for term in self.terms.iter().chain([&self.weight]) {
             to.f32(term.gain)?;
             to.f32(term.potential_j)?;
         }
@@ -200,7 +187,7 @@ impl<const J: usize> Ledger<J> {
     pub(crate) fn load(joints: usize, from: &mut Loader<'_>) -> Result<Self, SnapshotError> {
         let mut ledger = Self::new();
         from.f32s(&mut ledger.before_nm, joints)?;
-        for term in &mut ledger.terms {
+        for term in ledger.terms.iter_mut().chain([&mut ledger.weight]) {
             *term = Term { gain: from.f32()?, potential_j: from.f32()? };
         }
         ledger.work = Sum { sum: from.f32()?, over: from.f32()? };
@@ -223,16 +210,17 @@ mod tests {
     const PERIOD_S: f32 = 1e-3;
 
     /// A law with a potential `V_s`, J, at a force of one newton for each joule.
-    fn approach(potential_j: f32, damping_w: f32) -> Option<Doing> {
-        Some(Doing {
-            gains: Gains { force_n: potential_j, ..Gains::none() },
-            monitor: Monitor { approach_potential_j: potential_j, ..Monitor::none() },
+    fn approach(potential_j: f32, damping_w: f32) -> Option<Account<f32>> {
+        Some(Account {
+            gains: PerGain { grasp: [potential_j, 0.0], ..PerGain::all(0.0) },
+            potentials_j: PerGain { grasp: [potential_j, 0.0], ..PerGain::all(0.0) },
             damping_w,
+            ..Account::none()
         })
     }
 
     /// Enters a tick of one joint.
-    fn enter(ledger: &mut Ledger<1>, moved_rad: f32, last_nm: f32, law: Option<Doing>) {
+    fn enter(ledger: &mut Ledger<1>, moved_rad: f32, last_nm: f32, law: Option<Account<f32>>) {
         let motion = Motion { moved_rad: [moved_rad], ..Motion::still() };
         ledger.enter(&Entry { motion: &motion, last_nm: &[last_nm], law, period_s: PERIOD_S });
     }
@@ -284,7 +272,7 @@ mod tests {
         enter(&mut ledger, 0.0, 2.0, approach(1.0, 0.0));
         let law = |potential_j: f32| {
             let mut law = approach(1.0, 0.5);
-            law.iter_mut().for_each(|doing| doing.monitor.approach_potential_j = potential_j);
+            law.iter_mut().for_each(|account| account.potentials_j.grasp[0] = potential_j);
             law
         };
         // 2 N m over 0.25 rad, for which the potential falls by 0.375 J only.

@@ -24,10 +24,13 @@ pub mod identity;
 pub mod ledger;
 pub mod limit;
 pub mod link;
+pub mod list;
 pub mod math;
 pub mod parameter;
+pub mod parameters;
 pub mod period;
-pub mod settings;
+
+pub mod signals;
 pub mod supervisor;
 pub mod telemetry;
 pub mod tick;

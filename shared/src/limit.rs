@@ -10,9 +10,10 @@
 //! Each can be left out, and each says where it acted ([`Limiting`]). Limits are no faults: a hand that is limited does
 //! what it can.
 
+use crate::control::{GAINS, Gain, PerGain};
 use crate::hand::Hand;
 use crate::math::Real;
-use crate::parameter::ParameterError;
+use crate::parameter::{ParameterError, Text};
 use crate::period::Period;
 use core::fmt;
 use serde::{Deserialize, Serialize};
@@ -34,6 +35,16 @@ pub enum Limit {
 impl Limit {
     /// Every reason.
     pub const ALL: [Self; 4] = [Self::Torque, Self::Slew, Self::LowerStop, Self::UpperStop];
+
+    /// Its name in recordings and tables.
+    pub const fn key(self) -> &'static str {
+        match self {
+            Self::Torque => "torque",
+            Self::Slew => "slew",
+            Self::LowerStop => "lower_stop",
+            Self::UpperStop => "upper_stop",
+        }
+    }
 
     /// The reason in words.
     pub const fn words(self) -> &'static str {
@@ -100,49 +111,36 @@ impl fmt::Display for Limiting {
 /// Limits, as a user gives them; `None` leaves one out.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LimitConfig<const J: usize> {
-    /// Largest nominal grasping force that may be asked for, N.
-    pub force_n: Option<f32>,
-    /// Largest attitude stiffness that may be asked for, N m.
-    pub attitude_stiffness_nm: Option<f32>,
-    /// Largest gain of the joints' integral that may be asked for, N m/rad.
-    pub integral_gain_nm_rad: Option<f32>,
+    /// Largest gains that may be asked for.
+    pub gains: PerGain<Option<f32>>,
     /// Largest torque of each joint, N m.
     pub torque_nm: Option<[f32; J]>,
     /// Largest change of each joint's torque, N m/s.
     pub slew_nm_s: Option<[f32; J]>,
-    /// Soft end stops.
-    pub stops: Option<StopConfig<J>>,
+    /// How far before the end of each joint's range its soft end stop begins to act, rad; at most half the range.
+    pub stop_margin_rad: Option<[f32; J]>,
+    /// Torque with which a stop pushes back, by depth into the margin, N m/rad.
+    pub stop_stiffness_nm_rad: Option<[f32; J]>,
+    /// Torque that brakes motion towards the end, once the margin is used up, N m s/rad.
+    pub stop_damping_nm_s: Option<[f32; J]>,
 }
 
 impl<const J: usize> LimitConfig<J> {
     /// No limits.
     pub const NONE: Self = Self {
-        force_n: None,
-        attitude_stiffness_nm: None,
-        integral_gain_nm_rad: None,
+        gains: PerGain::all(None),
         torque_nm: None,
         slew_nm_s: None,
-        stops: None,
+        stop_margin_rad: None,
+        stop_stiffness_nm_rad: None,
+        stop_damping_nm_s: None,
     };
-}
-
-/// Soft end stops, as a user gives them.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct StopConfig<const J: usize> {
-    /// How far before the end of the joint's range the stop begins to act, rad; at most half the range.
-    pub margin_rad: [f32; J],
-    /// Torque that pushes back, by depth into the margin, N m/rad.
-    pub stiffness_nm_rad: [f32; J],
-    /// Torque that brakes motion towards the end, once the margin is used up, N m s/rad.
-    pub damping_nm_s: [f32; J],
 }
 
 /// The limits, prepared for the joints of one hand.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Limits<const J: usize> {
-    force_n: Option<f32>,
-    attitude_stiffness_nm: Option<f32>,
-    integral_gain_nm_rad: Option<f32>,
+    gains: PerGain<Option<f32>>,
     joint_count: usize,
     joints: [JointLimits; J],
 }
@@ -179,13 +177,10 @@ impl<const J: usize> LimitConfig<J> {
         hand: &Hand<f32, J, F>,
         period: Period,
     ) -> Result<Limits<J>, ParameterError> {
-        for (limit, parameter) in [
-            (self.force_n, "limits.force_n"),
-            (self.attitude_stiffness_nm, "limits.attitude_stiffness_nm"),
-            (self.integral_gain_nm_rad, "limits.integral_gain_nm_rad"),
-        ] {
+        for (gain, limit) in GAINS.iter().zip(self.gains.iter()) {
             if limit.is_some_and(|limit| !(limit >= 0.0 && limit.is_finite())) {
-                return Err(ParameterError { parameter, joint: None, reason: "has to be zero or positive" });
+                let (parameter, reason) = (Text::new("limits.", gain.key), "has to be zero or positive");
+                return Err(ParameterError { parameter, joint: None, reason });
             }
         }
         let joint_count = hand.joint_count().min(J);
@@ -196,21 +191,15 @@ impl<const J: usize> LimitConfig<J> {
                 range_rad: hand.range_rad(k),
                 torque_nm: self.torque_nm.map(|torques| torques[k]),
                 slew_nm_s: self.slew_nm_s.map(|slews| slews[k]),
-                stop: self.stops.as_ref().map(|stops| StopConfigOf {
-                    margin_rad: stops.margin_rad[k],
-                    stiffness_nm_rad: stops.stiffness_nm_rad[k],
-                    damping_nm_s: stops.damping_nm_s[k],
+                stop: self.stop_margin_rad.map(|margins| StopConfig {
+                    margin_rad: margins[k],
+                    stiffness_nm_rad: self.stop_stiffness_nm_rad.map_or(0.0, |stiffnesses| stiffnesses[k]),
+                    damping_nm_s: self.stop_damping_nm_s.map_or(0.0, |dampings| dampings[k]),
                 }),
             };
             *joint = of_joint.prepare(period)?;
         }
-        Ok(Limits {
-            force_n: self.force_n,
-            attitude_stiffness_nm: self.attitude_stiffness_nm,
-            integral_gain_nm_rad: self.integral_gain_nm_rad,
-            joint_count,
-            joints,
-        })
+        Ok(Limits { gains: self.gains, joint_count, joints })
     }
 }
 
@@ -220,11 +209,11 @@ struct JointConfig {
     range_rad: (f32, f32),
     torque_nm: Option<f32>,
     slew_nm_s: Option<f32>,
-    stop: Option<StopConfigOf>,
+    stop: Option<StopConfig>,
 }
 
 /// The soft end stops of one joint.
-struct StopConfigOf {
+struct StopConfig {
     margin_rad: f32,
     stiffness_nm_rad: f32,
     damping_nm_s: f32,
@@ -248,8 +237,8 @@ impl JointConfig {
         })
     }
 
-    fn prepare_stop(&self, stop: &StopConfigOf) -> Result<Stop, ParameterError> {
-        let &StopConfigOf { margin_rad, stiffness_nm_rad, damping_nm_s } = stop;
+    fn prepare_stop(&self, stop: &StopConfig) -> Result<Stop, ParameterError> {
+        let &StopConfig { margin_rad, stiffness_nm_rad, damping_nm_s } = stop;
         let (lower, upper) = self.range_rad;
         if !(is_positive(margin_rad) && margin_rad + margin_rad <= upper - lower) {
             let reason = "has to be positive and at most half the joint's range";
@@ -271,13 +260,8 @@ impl JointConfig {
     }
 
     fn fail<R>(&self, parameter: &'static str, reason: &'static str) -> Result<R, ParameterError> {
-        Err(ParameterError { parameter, joint: Some(self.joint), reason })
+        Err(ParameterError { parameter: parameter.into(), joint: Some(self.joint), reason })
     }
-}
-
-/// Whether a gain is none below zero, and at most the largest.
-fn allows(most: Option<f32>, gain: f32) -> bool {
-    gain >= 0.0 && gain.is_finite() && most.is_none_or(|most| gain <= most)
 }
 
 fn is_positive(v: f32) -> bool {
@@ -285,19 +269,13 @@ fn is_positive(v: f32) -> bool {
 }
 
 impl<const J: usize> Limits<J> {
-    /// Whether a nominal grasping force may be asked for.
-    pub fn allows_force(&self, force_n: f32) -> bool {
-        allows(self.force_n, force_n)
-    }
-
-    /// Whether an attitude stiffness may be asked for.
-    pub fn allows_attitude_stiffness(&self, stiffness_nm: f32) -> bool {
-        allows(self.attitude_stiffness_nm, stiffness_nm)
-    }
-
-    /// Whether a gain of the joints' integral may be asked for.
-    pub fn allows_integral_gain(&self, gain_nm_rad: f32) -> bool {
-        allows(self.integral_gain_nm_rad, gain_nm_rad)
+    /// Returns the gain that is below zero, above the largest that may be asked for, or not finite.
+    pub fn forbidden(&self, gains: &PerGain<f32>) -> Option<&'static Gain> {
+        let mut values = gains.iter().zip(self.gains.iter());
+        let k = values.position(|(&gain, most)| {
+            !(gain >= 0.0 && gain.is_finite() && most.is_none_or(|most| gain <= most))
+        })?;
+        GAINS.get(k)
     }
 
     /// Takes the wanted torques to the allowed ones, N m, and says what limited each joint.
@@ -371,7 +349,7 @@ mod tests {
 
     /// Range -1 to 1 rad, margin 0.1 rad; ticks of a millisecond.
     fn joint(torque_nm: Option<f32>, slew_nm: Option<f32>, stops: bool) -> JointLimits {
-        let stop = StopConfigOf { margin_rad: 0.1, stiffness_nm_rad: 2.0, damping_nm_s: 0.5 };
+        let stop = StopConfig { margin_rad: 0.1, stiffness_nm_rad: 2.0, damping_nm_s: 0.5 };
         let config = JointConfig {
             joint: 0,
             range_rad: (-1.0, 1.0),

@@ -1,12 +1,68 @@
-//! What is said of a parameter that can't be used. Every group of parameters is checked once, before the first tick.
+//! Names of parameters, and what is said of one that can't be used. Every group of parameters is checked once, before
+//! the first tick.
 
 use core::fmt;
+
+/// Two pieces of text, one behind the other: so a table derives a name from another's, without a heap.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Text {
+    prefix: &'static str,
+    rest: &'static str,
+}
+
+impl Text {
+    /// Returns one piece behind another.
+    pub const fn new(prefix: &'static str, rest: &'static str) -> Self {
+        Self { prefix, rest }
+    }
+
+    /// Returns a text of one piece.
+    pub const fn plain(text: &'static str) -> Self {
+        Self::new("", text)
+    }
+}
+
+impl From<&'static str> for Text {
+    fn from(text: &'static str) -> Self {
+        Self::plain(text)
+    }
+}
+
+impl PartialEq<str> for Text {
+    fn eq(&self, other: &str) -> bool {
+        other.strip_prefix(self.prefix) == Some(self.rest)
+    }
+}
+
+impl PartialEq<&str> for Text {
+    fn eq(&self, other: &&str) -> bool {
+        *self == **other
+    }
+}
+
+impl fmt::Display for Text {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.prefix)?;
+        f.write_str(self.rest)
+    }
+}
+
+/// What there is one of.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Each {
+    /// Nothing: there is one, with index 0.
+    Hand,
+    /// The joints.
+    Joint,
+    /// The axes x, y, z.
+    Axis,
+}
 
 /// A parameter that can't be used, and why.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ParameterError {
     /// The parameter.
-    pub parameter: &'static str,
+    pub parameter: Text,
     /// The joint that it belongs to, if it belongs to one.
     pub joint: Option<usize>,
     /// What it has to be.

@@ -22,7 +22,7 @@ impl Period {
             Some(microseconds) if (100..=100_000).contains(&microseconds.get()) => Ok(Self { microseconds }),
             _ => {
                 let reason = "has to be from 100 to 100000";
-                Err(ParameterError { parameter: "period_us", joint: None, reason })
+                Err(ParameterError { parameter: "period_us".into(), joint: None, reason })
             }
         }
     }
@@ -44,7 +44,7 @@ impl Period {
     pub fn ticks(self, milliseconds: u32, parameter: &'static str) -> Result<u32, ParameterError> {
         if milliseconds > LONGEST_MS {
             return Err(ParameterError {
-                parameter,
+                parameter: parameter.into(),
                 joint: None,
                 reason: "has to be at most an hour (3600000)",
             });

@@ -180,9 +180,9 @@ pub enum Drive {
     Hold,
     /// The grasp law.
     Grip {
-        /// Share of `f_d`.
+        /// Share of forces: see [`Ramp`](crate::control::Ramp).
         force_share: f32,
-        /// Share of `K_st` and `K_I`.
+        /// Share of stiffnesses: see [`Ramp`](crate::control::Ramp).
         stiffness_share: f32,
     },
 }

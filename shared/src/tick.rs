@@ -16,12 +16,12 @@ mod state;
 pub use state::State;
 
 use crate::command::{Command, Grasp, Refusal};
-use crate::control::{Gains, GraspConfig, GraspLaw, Grip, Latch, Monitor};
+use crate::control::{Account, Grip, Latch, Laws, LawsConfig, PerGain, Ramp, Stance};
 use crate::estimate::{Estimator, EstimatorConfig, Motion};
 use crate::event::{Event, Events};
 use crate::fault::{Driven, Fault, FaultConfig, Raised, Watch};
 use crate::hand::Hand;
-use crate::ledger::{Doing, Entry};
+use crate::ledger::Entry;
 use crate::limit::{LimitConfig, Limiting, Limits};
 use crate::parameter::ParameterError;
 use crate::period::Period;
@@ -35,8 +35,8 @@ pub struct Config<const J: usize> {
     pub period_us: u32,
     /// Encoders and filter.
     pub estimator: EstimatorConfig<J>,
-    /// Gains of the grasp law.
-    pub law: GraspConfig<f32, J>,
+    /// Laws and their gains.
+    pub laws: LawsConfig<f32, J>,
     /// Limits.
     pub limits: LimitConfig<J>,
     /// Where faults begin.
@@ -49,6 +49,10 @@ pub struct Config<const J: usize> {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Params<const J: usize, const F: usize> {
     hand: Hand<f32, J, F>,
+    /// What the hand's file says: how far the line may go.
+    file: Config<J>,
+    /// The parameters that differ from it, a bit for each.
+    pub(crate) changed: u64,
     prepared: Prepared<J>,
 }
 
@@ -59,7 +63,7 @@ struct Prepared<const J: usize> {
     period: Period,
     period_s: f32,
     estimator: Estimator<J>,
-    law: GraspLaw<f32, J>,
+    laws: Laws<f32, J>,
     limits: Limits<J>,
     watch: Watch<J>,
     ramps: Ramps,
@@ -72,20 +76,13 @@ impl<const J: usize> Prepared<J> {
         let period = Period::from_us(config.period_us)?;
         let estimator = config.estimator.prepare(hand.joint_count(), period)?;
         let limits = config.limits.prepare(hand, period)?;
-        let law = config.law.prepare(hand)?;
-        let fail = |parameter, reason| Err(ParameterError { parameter, joint: None, reason });
-        let gains = law.gains();
-        if !limits.allows_force(gains.force_n) {
-            return fail("force_n", "has to be at most limits.force_n");
-        }
-        if !limits.allows_attitude_stiffness(gains.attitude_stiffness_nm) {
-            return fail("attitude_stiffness_nm", "has to be at most limits.attitude_stiffness_nm");
-        }
-        if !limits.allows_integral_gain(gains.integral_gain_nm_rad) {
-            return fail("integral_gain_nm_rad", "has to be at most limits.integral_gain_nm_rad");
+        let laws = config.laws.prepare(hand)?;
+        if let Some(gain) = limits.forbidden(&config.laws.gains) {
+            let reason = "has to be at most its limit, the parameter `limits.` and this name";
+            return Err(ParameterError { parameter: gain.key.into(), joint: None, reason });
         }
         Ok(Self {
-            law,
+            laws,
             limits,
             watch: config.faults.prepare(hand, &estimator, period)?,
             ramps: config.supervisor.prepare(period)?,
@@ -103,7 +100,7 @@ impl<const J: usize, const F: usize> Params<J, F> {
     /// # Errors
     /// The first parameter that is wrong, with its joint and the reason.
     pub fn new(hand: Hand<f32, J, F>, config: &Config<J>) -> Result<Self, ParameterError> {
-        Ok(Self { prepared: Prepared::new(&hand, config)?, hand })
+        Ok(Self { prepared: Prepared::new(&hand, config)?, file: *config, changed: 0, hand })
     }
 
     /// Exchanges the configuration; a hand in motion would jump.
@@ -125,6 +122,11 @@ impl<const J: usize, const F: usize> Params<J, F> {
         &self.prepared.config
     }
 
+    /// The configuration of the hand's file, with which it started.
+    pub fn file(&self) -> &Config<J> {
+        &self.file
+    }
+
     /// The tick period.
     pub fn period(&self) -> Period {
         self.prepared.period
@@ -135,9 +137,9 @@ impl<const J: usize, const F: usize> Params<J, F> {
         &self.prepared.estimator
     }
 
-    /// The grasp law.
-    pub fn law(&self) -> &GraspLaw<f32, J> {
-        &self.prepared.law
+    /// The control laws.
+    pub fn laws(&self) -> &Laws<f32, J> {
+        &self.prepared.laws
     }
 }
 
@@ -221,7 +223,7 @@ pub fn tick<const J: usize, const F: usize>(
     state.ledger.enter(&Entry {
         motion: &state.motion,
         last_nm: &state.torques_nm,
-        law: action.doing,
+        law: action.account,
         period_s: params.prepared.period_s,
     });
     if !grasped && state.latch.is_some() {
@@ -244,8 +246,7 @@ pub fn tick<const J: usize, const F: usize>(
         Sensed::Ideal { .. } => (List::first_of([0; J], 0), None),
         Sensed::Failed(raised) => (List::first_of([0; J], 0), Some(raised)),
     };
-    let (gains, monitor) =
-        action.doing.map_or((Gains::none(), Monitor::none()), |doing| (doing.gains, doing.monitor));
+    let account = action.account.unwrap_or(Account::none());
     let record = Record {
         sequence: state.ticks,
         tick: state.ticks,
@@ -254,12 +255,9 @@ pub fn tick<const J: usize, const F: usize>(
         answer,
         events: input.events,
         reading_failed,
-        force_n: gains.force_n,
-        attitude_stiffness_nm: gains.attitude_stiffness_nm,
-        integral_gain_nm_rad: gains.integral_gain_nm_rad,
-        approach_potential_j: monitor.approach_potential_j,
-        attitude_potential_j: monitor.attitude_potential_j,
-        integral_potential_j: monitor.integral_potential_j,
+        gains: account.gains,
+        potentials_j: account.potentials_j,
+        law_signals: account.signals,
         work_j: state.ledger.work_j(),
         damped_j: state.ledger.damped_j(),
         excess_j: state.ledger.excess_j(),
@@ -340,16 +338,16 @@ fn object<const J: usize, const F: usize>(
         Command::Arm if events.contains(Event::FallbackClock) => Some(Refusal::FallbackClock),
         Command::Arm if params.prepared.watch.silent(&state.watched) => Some(Refusal::NoHeartbeat),
         Command::Grasp(grasp) => {
+            let asked = &grasp.gains;
+            let chosen = params.config().laws.chosen;
+            let mut of_other_laws =
+                asked.iter().zip(PerGain::LAW.iter()).filter(|(_, law)| !chosen.has(**law));
             let gains = gains(params, grasp);
-            let limits = &params.prepared.limits;
-            let Gains { force_n, attitude_stiffness_nm, integral_gain_nm_rad } = gains;
-            if !(force_n.is_finite() && attitude_stiffness_nm.is_finite() && integral_gain_nm_rad.is_finite())
-            {
+            if !gains.iter().all(|gain| gain.is_finite()) {
                 Some(Refusal::NotFinite)
-            } else if !(limits.allows_force(force_n)
-                && limits.allows_attitude_stiffness(attitude_stiffness_nm)
-                && limits.allows_integral_gain(integral_gain_nm_rad))
-            {
+            } else if of_other_laws.any(|(gain, _)| gain.is_some_and(|gain| gain != 0.0)) {
+                Some(Refusal::LawNotChosen)
+            } else if params.prepared.limits.forbidden(&gains).is_some() {
                 Some(Refusal::OutOfRange)
             } else {
                 // To be told that it is done would be wrong for a grasp of other gains.
@@ -362,13 +360,8 @@ fn object<const J: usize, const F: usize>(
 }
 
 /// How firmly a command wants to grasp.
-fn gains<const J: usize, const F: usize>(params: &Params<J, F>, grasp: Grasp) -> Gains<f32> {
-    let configured = params.prepared.law.gains();
-    Gains {
-        force_n: grasp.force_n.unwrap_or(configured.force_n),
-        attitude_stiffness_nm: grasp.attitude_stiffness_nm.unwrap_or(configured.attitude_stiffness_nm),
-        integral_gain_nm_rad: grasp.integral_gain_nm_rad.unwrap_or(configured.integral_gain_nm_rad),
-    }
+fn gains<const J: usize, const F: usize>(params: &Params<J, F>, grasp: Grasp) -> PerGain<f32> {
+    params.prepared.laws.gains().zip_with(&grasp.gains, |&configured, asked| asked.unwrap_or(configured))
 }
 
 /// What the joints are to be given, and why.
@@ -377,14 +370,14 @@ struct Action<const J: usize> {
     limiting: [Limiting; J],
     /// A torque that is not a finite number.
     not_finite: Option<Raised>,
-    /// The law; `None` without torque.
-    doing: Option<Doing>,
+    /// What the laws say; `None` without torque.
+    account: Option<Account<f32>>,
 }
 
 impl<const J: usize> Action<J> {
     /// No torque.
     fn none() -> Self {
-        Self { torques_nm: [0.0; J], limiting: [Limiting::NONE; J], not_finite: None, doing: None }
+        Self { torques_nm: [0.0; J], limiting: [Limiting::NONE; J], not_finite: None, account: None }
     }
 }
 
@@ -399,28 +392,21 @@ fn act<const J: usize, const F: usize>(params: &Params<J, F>, state: &mut State<
     }
     let Motion { angles_rad, speeds_rad_s, .. } = &state.motion;
     params.hand.forward_kinematics(angles_rad, &mut state.posture);
-    let posture = &state.posture;
+    let stance = Stance { hand: &params.hand, posture: &state.posture, angles_rad };
     let grip = match drive {
         Drive::Off | Drive::Hold => None,
         Drive::Grip { force_share, stiffness_share } => Some(Grip {
-            latch: &*state.latch.get_or_insert_with(|| Latch::of(posture, angles_rad)),
-            gains: Gains {
-                force_n: state.grasp.force_n * force_share,
-                attitude_stiffness_nm: state.grasp.attitude_stiffness_nm * stiffness_share,
-                integral_gain_nm_rad: state.grasp.integral_gain_nm_rad * stiffness_share,
-            },
+            latch: &*state.latch.get_or_insert_with(|| Latch::of(stance.posture, angles_rad)),
+            gains: state.grasp.zip_with(&PerGain::RAMP, |gain, ramp| match ramp {
+                Ramp::Force => gain * force_share,
+                Ramp::Stiffness => gain * stiffness_share,
+            }),
         }),
     };
-    let law = &params.prepared.law;
-    let (wanted_nm, monitor) = law.torques(&params.hand, posture, angles_rad, speeds_rad_s, grip);
+    let (wanted_nm, account) = params.prepared.laws.torques(&stance, speeds_rad_s, grip.as_ref());
     let (torques_nm, limiting) =
         params.prepared.limits.apply(angles_rad, speeds_rad_s, &state.torques_nm, &wanted_nm);
     // A limit makes an infinite torque finite: both sides of it are looked at.
     let not_finite = params.prepared.watch.torques(&wanted_nm).or(params.prepared.watch.torques(&torques_nm));
-    let doing = Doing {
-        gains: grip.map_or(Gains::none(), |grip| grip.gains),
-        monitor,
-        damping_w: law.damping_power_w(speeds_rad_s),
-    };
-    Action { torques_nm, limiting, not_finite, doing: Some(doing) }
+    Action { torques_nm, limiting, not_finite, account: Some(account) }
 }

@@ -102,7 +102,7 @@ fn the_bits_are_those_of_every_other_machine() {
 /// The same hand with the earlier law: `u_I` in the place of `u_st`.
 fn earlier<const J: usize>() -> Config<J> {
     let mut config = config();
-    (config.law.attitude_stiffness_nm, config.law.integral_gain_nm_rad) = (0.0, 0.02);
+    (config.laws.gains.grasp[1], config.laws.gains.integral[0]) = (0.0, 0.02);
     config
 }
 

@@ -1,6 +1,7 @@
 //! Dense records: what they carry, what a line that loses some of them does, and their bytes.
 
 use blindgrasp_shared::command::{Answer, Command};
+use blindgrasp_shared::control::{PerGain, PerSignal};
 use blindgrasp_shared::event::{Event, Events};
 use blindgrasp_shared::fault::{Fault, Raised};
 use blindgrasp_shared::limit::{Limit, Limiting};
@@ -21,7 +22,7 @@ fn record(tick: u32) -> Record12 {
         tick,
         mode: Mode::Grasping,
         decimation: 1,
-        force_n: 5.0,
+        gains: PerGain { grasp: [5.0, 0.0], ..PerGain::all(0.0) },
         cycles: 12_345,
         counts: List::first_of([1000; 12], 12),
         torques_nm: List::first_of([0.1; 12], 12),
@@ -71,7 +72,7 @@ fn golden_bytes() {
     let mut sender = Sender::new();
     let mut first = record(70_000);
     first.sequence = 300;
-    first.approach_potential_j = 0.25;
+    first.potentials_j.grasp[0] = 0.25;
     assert_eq!(sent(&mut sender, &first, Signals::FULL)[0], 3, "the first is in full");
     let mut limiting = [Limiting::NONE; 12];
     limiting[1].insert(Limit::Torque);
@@ -286,8 +287,7 @@ prop_compose! {
                 answer: answered.then_some(Answer { command: Command::Arm, refused: None }),
                 events: Events::NONE.with(Event::Late, lost % 7 == 0),
                 reading_failed: raised.filter(|_| failed),
-                force_n: law[0], attitude_stiffness_nm: law[1], integral_gain_nm_rad: law[2],
-                approach_potential_j: law[3], attitude_potential_j: law[4], integral_potential_j: law[5],
+                gains: PerGain::of([law[0], law[1], law[2]]), potentials_j: PerGain::of([law[3], law[4], law[5]]), law_signals: PerSignal::all(0.0),
                 work_j: law[6], damped_j: law[7], excess_j: law[8],
                 counts: List::first_of(counts, if failed { 0 } else { 12 }),
                 torques_nm: List::first_of(torques, 12),

@@ -3,13 +3,14 @@
 mod common;
 
 use blindgrasp_shared::command::{Command, Grasp, Refusal};
+use blindgrasp_shared::control::PerGain;
 use blindgrasp_shared::device::{Device, Inputs, Outputs, Reading};
 use blindgrasp_shared::event::Event;
 use blindgrasp_shared::fault::{Fault, Raised};
 use blindgrasp_shared::identity::{Clock, Identity, Image, ResetCause, UNITS};
 use blindgrasp_shared::link::message::{Packet, Reply, Request, Sample, Signals, not_understood};
 use blindgrasp_shared::link::{self, Receiver, most_bytes};
-use blindgrasp_shared::settings::{Each, Parameter};
+use blindgrasp_shared::parameters::{Bound, Parameter, Setting};
 use blindgrasp_shared::supervisor::Mode;
 use blindgrasp_shared::telemetry::burst::{AFTER, BEFORE, Burst};
 use blindgrasp_shared::telemetry::snapshot::{Collector, PART_BYTES};
@@ -31,7 +32,7 @@ fn identity(clock: Clock) -> Identity<'static> {
         fingertip_count: 3,
         period_us: 1000,
     };
-    Identity { image, units: UNITS, clock, reset: ResetCause::PowerOn, crash: None }
+    Identity { image, units: UNITS, clock, reset: ResetCause::PowerOn, crash: None, changed: 0 }
 }
 
 /// A device and a host that numbers its requests.
@@ -198,7 +199,7 @@ fn arming_needs_a_heartbeat_and_the_crystal() {
 #[test]
 fn a_heartbeat_keeps_the_grasp_and_nothing_else_does() {
     let mut bench = Bench::grasping();
-    let about_telemetry = Request::GetParameter { parameter: Parameter::Force, index: 0 };
+    let about_telemetry = Request::GetParameter { parameter: Parameter::gain(0), index: 0 };
     for tick in 0..1000 {
         let request = if tick % 100 == 0 { Request::Heartbeat } else { about_telemetry.clone() };
         bench.ask(request);
@@ -218,7 +219,11 @@ fn commands_are_answered_by_the_tick() {
     assert_eq!(bench.refused(GRASP), Some(Refusal::NotArmed));
     bench.done(Request::Heartbeat);
     bench.done(ARM);
-    let firm = |force_n| Request::Command(Command::Grasp(Grasp { force_n, ..Grasp::CONFIGURED }));
+    let firm = |force_n| {
+        Request::Command(Command::Grasp(Grasp {
+            gains: PerGain { grasp: [force_n, None], ..PerGain::all(None) },
+        }))
+    };
     assert_eq!(bench.refused(firm(Some(f32::NAN))), Some(Refusal::NotFinite));
     assert_eq!(bench.refused(firm(Some(1e9))), Some(Refusal::OutOfRange));
     bench.done(firm(Some(1.0)));
@@ -230,20 +235,24 @@ fn commands_are_answered_by_the_tick() {
 #[test]
 fn every_parameter_can_be_read_and_set_back() {
     let mut bench = Bench::new();
-    for &parameter in Parameter::ALL {
-        let count = match parameter.each() {
-            Each::Hand => 1,
-            Each::Joint => JOINTS as u8,
-            Each::Axis => 3,
-        };
+    for parameter in Parameter::ALL {
+        let count = parameter.count(JOINTS);
         for index in 0..count {
-            let Reply::Value { value, .. } = bench.ask(Request::GetParameter { parameter, index }) else {
+            let Reply::Value { setting: Setting { value, file }, .. } =
+                bench.ask(Request::GetParameter { parameter, index })
+            else {
                 panic!("{parameter}");
             };
+            assert_eq!(value, file, "{parameter}");
             bench.done(Request::SetParameter { parameter, index, value });
             let before = *bench.device.params().config();
-            // Something else that can be used: every parameter has room below.
-            let other = if parameter == Parameter::LateTicks { 2.0 } else { 0.75 * value };
+            // Something else that can be used: tighter than the file, where there is a limit.
+            let share = if parameter.bound() == Bound::AtLeast { 1.25 } else { 0.75 };
+            let other = match parameter {
+                Parameter::LATE_TICKS => 2.0,
+                _ if parameter.key().to_string().starts_with("laws.") => 0.0,
+                _ => share * value,
+            };
             let other = if value.fract() == 0.0 && value > 4.0 { other.round() } else { other };
             match bench.refused(Request::SetParameter { parameter, index, value: other }) {
                 None if other != value => assert_ne!(*bench.device.params().config(), before, "{parameter}"),
@@ -256,16 +265,36 @@ fn every_parameter_can_be_read_and_set_back() {
                 let refused = bench.refused(Request::SetParameter { parameter, index, value: bad });
                 assert_eq!(refused, Some(Refusal::NotFinite));
             }
-            if parameter != Parameter::Gravity {
-                let refused = bench.refused(Request::SetParameter { parameter, index, value: -1.0 });
-                assert_eq!(refused, Some(Refusal::OutOfRange), "{parameter}");
+            let refused = |value| Request::SetParameter { parameter, index, value };
+            let negative = match parameter.bound() {
+                _ if parameter == Parameter::GRAVITY => None,
+                Bound::AtLeast => Some(Refusal::BeyondFile),
+                Bound::Free | Bound::AtMost => Some(Refusal::OutOfRange),
+            };
+            if negative.is_some() {
+                assert_eq!(bench.refused(refused(-1.0)), negative, "{parameter}");
             }
+            match parameter.bound() {
+                Bound::Free => {}
+                Bound::AtMost => {
+                    let looser = (1.001 * value).max(value + 1e-6).ceil();
+                    assert_eq!(bench.refused(refused(looser)), Some(Refusal::BeyondFile), "{parameter}");
+                }
+                Bound::AtLeast => {
+                    assert_eq!(
+                        bench.refused(refused(0.99 * value)),
+                        Some(Refusal::BeyondFile),
+                        "{parameter}"
+                    );
+                }
+            }
+            assert_eq!(*bench.device.params().config(), before, "refused, {parameter} changes nothing");
         }
         let request = Request::GetParameter { parameter, index: count };
         assert_eq!(bench.refused(request), Some(Refusal::NoSuchParameter));
     }
     assert_eq!(
-        bench.refused(Request::SetParameter { parameter: Parameter::ReleaseTime, index: 0, value: 0.5 }),
+        bench.refused(Request::SetParameter { parameter: Parameter::RELEASE_TIME, index: 0, value: 0.5 }),
         Some(Refusal::OutOfRange),
         "not whole"
     );
@@ -274,13 +303,13 @@ fn every_parameter_can_be_read_and_set_back() {
 #[test]
 fn parameters_are_set_while_disarmed_and_a_limit_that_is_off_stays_off() {
     let mut bench = Bench::grasping();
-    let set = Request::SetParameter { parameter: Parameter::Force, index: 0, value: 1.0 };
+    let set = Request::SetParameter { parameter: Parameter::gain(0), index: 0, value: 1.0 };
     assert_eq!(bench.refused(set), Some(Refusal::NotDisarmed));
     let mut config = config::<12>();
     config.limits.slew_nm_s = None;
     let mut bench = Bench { device: Device::new(params(&config), identity(Clock::External)), ..Bench::new() };
     bench.ask(Request::Hello { interface_version: INTERFACE_VERSION });
-    let set = Request::SetParameter { parameter: Parameter::SlewLimit, index: 0, value: 1.0 };
+    let set = Request::SetParameter { parameter: Parameter::SLEW_LIMIT, index: 0, value: 1.0 };
     assert_eq!(bench.refused(set), Some(Refusal::SwitchedOff));
 }
 
@@ -357,8 +386,7 @@ fn the_longest_messages_fit() {
     let sample = Sample { counts: all, failed: Some(Raised::at(255, Fault::OutputFailed)), late: true };
     let packet = Packet::<24> { session: u16::MAX, sequence: u16::MAX, request: Request::Joints(sample) };
     assert!(postcard_bytes(&packet, &mut buffer).len() <= Packet::<24>::MOST_BYTES);
-    let most =
-        Grasp { force_n: Some(1.0), attitude_stiffness_nm: Some(1.0), integral_gain_nm_rad: Some(1.0) };
+    let most = Grasp { gains: PerGain::all(Some(1.0)) };
     let packet = Packet::<1> {
         session: u16::MAX,
         sequence: u16::MAX,
@@ -375,10 +403,12 @@ fn the_longest_messages_fit() {
 
 /// Requests of every kind, most with values that can't be used.
 fn requests() -> impl Strategy<Value = Request<12>> {
-    let parameter = proptest::sample::select(Parameter::ALL);
+    let parameter = proptest::sample::select(Parameter::ALL.to_vec());
     let grasp =
         any::<[Option<f32>; 3]>().prop_map(|[force_n, attitude_stiffness_nm, integral_gain_nm_rad]| {
-            Command::Grasp(Grasp { force_n, attitude_stiffness_nm, integral_gain_nm_rad })
+            Command::Grasp(Grasp {
+                gains: PerGain::of([force_n, attitude_stiffness_nm, integral_gain_nm_rad]),
+            })
         });
     prop_oneof![
         any::<u16>().prop_map(|interface_version| Request::Hello { interface_version }),

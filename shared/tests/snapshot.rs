@@ -4,6 +4,7 @@ mod common;
 
 use blindgrasp_shared::bytes::SnapshotError;
 use blindgrasp_shared::command::{Command, Grasp};
+use blindgrasp_shared::control::PerGain;
 use blindgrasp_shared::event::{Event, Events};
 use blindgrasp_shared::fault::{Fault, Raised};
 use blindgrasp_shared::supervisor::Mode;
@@ -63,8 +64,12 @@ fn script(seed: u64, ticks: usize) -> Vec<Step> {
             }
             silent = silent.saturating_sub(1);
             let integral_gain_nm_rad = Some(0.01 * lcg.below(3) as f32);
-            let grasp =
-                Grasp { force_n: Some(lcg.below(16) as f32), integral_gain_nm_rad, ..Grasp::CONFIGURED };
+            let grasp = Grasp {
+                gains: PerGain {
+                    grasp: [Some(lcg.below(16) as f32), None],
+                    integral: [integral_gain_nm_rad],
+                },
+            };
             let command = match lcg.below(160) {
                 0..10 => Some(Command::Arm),
                 10..20 => Some(Command::Grasp(Grasp::CONFIGURED)),

@@ -3,6 +3,7 @@
 mod common;
 
 use blindgrasp_shared::command::{Answer, Command, Grasp, Refusal};
+use blindgrasp_shared::control::PerGain;
 use blindgrasp_shared::event::{Event, Events};
 use blindgrasp_shared::fault::{Fault, FaultConfig, Raised};
 use blindgrasp_shared::limit::{Limit, LimitConfig};
@@ -70,9 +71,9 @@ fn each_mode_drives_as_it_should() {
         let torque = !matches!(mode, Mode::Disarmed | Mode::Fault);
         assert_eq!(has_torque(&output), torque, "{mode:?}");
         let grip = matches!(mode, Mode::Grasping | Mode::Releasing);
-        assert_eq!(output.record.force_n > 0.0, grip, "{mode:?}");
-        assert_eq!(output.record.attitude_stiffness_nm > 0.0, grip, "{mode:?}");
-        assert_eq!(output.record.approach_potential_j > 0.0, grip, "{mode:?}");
+        assert_eq!(output.record.gains.grasp[0] > 0.0, grip, "{mode:?}");
+        assert_eq!(output.record.gains.grasp[1] > 0.0, grip, "{mode:?}");
+        assert_eq!(output.record.potentials_j.grasp[0] > 0.0, grip, "{mode:?}");
         assert_eq!(state.latch().is_some(), grip, "{mode:?}");
     }
 }
@@ -109,7 +110,7 @@ fn attitudes_are_latched_at_the_first_grasping_tick_and_anew_for_each_grasp() {
     let params = params(&config());
     let mut state = in_mode(&params, Mode::Armed);
     let record = tick(&params, &mut state, &Input::counts(&facing_counts(), Some(GRASP))).record;
-    assert!(record.attitude_potential_j.abs() < 1e-7, "{}", record.attitude_potential_j);
+    assert!(record.potentials_j.grasp[1].abs() < 1e-7, "{}", record.potentials_j.grasp[1]);
     let first = *state.latch().unwrap();
     let mut turned = facing_counts();
     let mut record = record;
@@ -120,12 +121,12 @@ fn attitudes_are_latched_at_the_first_grasping_tick_and_anew_for_each_grasp() {
     // 1,000 counts are 0.29 rad: 2 K_st (1 - cos a) for each of the fingertip's two neighbours, in a ring of three.
     let expected = 2.0 * 2.0 * 5e-3 * (1.0 - 0.958_0);
     assert!(
-        (record.attitude_potential_j - expected).abs() < 0.1 * expected,
+        (record.potentials_j.grasp[1] - expected).abs() < 0.1 * expected,
         "{}",
-        record.attitude_potential_j
+        record.potentials_j.grasp[1]
     );
     let record = tick(&params, &mut state, &Input::counts(&turned, Some(GRASP))).record;
-    assert!(record.attitude_potential_j > 0.0, "a repeated command must not latch anew");
+    assert!(record.potentials_j.grasp[1] > 0.0, "a repeated command must not latch anew");
     assert_eq!(state.latch(), Some(&first));
     for command in [Command::Stop, Command::Arm, GRASP] {
         tick(&params, &mut state, &Input::counts(&turned, Some(command)));
@@ -136,28 +137,28 @@ fn attitudes_are_latched_at_the_first_grasping_tick_and_anew_for_each_grasp() {
 #[test]
 fn force_grows_over_the_soft_start_and_falls_over_the_release() {
     let mut config = config();
-    config.law.integral_gain_nm_rad = 0.25;
+    config.laws.gains.integral[0] = 0.25;
     let params = params(&config);
     let mut state = in_mode(&params, Mode::Armed);
     let counts = facing_counts();
     let mut last = tick(&params, &mut state, &Input::counts(&counts, Some(GRASP))).record;
-    assert_eq!(last.force_n, 5.0 * (1.0_f32 / 100.0));
+    assert_eq!(last.gains.grasp[0], 5.0 * (1.0_f32 / 100.0));
     for _ in 1..100 {
         let record = tick(&params, &mut state, &Input::counts(&counts, None)).record;
-        assert!(record.force_n > last.force_n);
-        assert_eq!((record.attitude_stiffness_nm, record.integral_gain_nm_rad), (5e-3, 0.25));
+        assert!(record.gains.grasp[0] > last.gains.grasp[0]);
+        assert_eq!((record.gains.grasp[1], record.gains.integral[0]), (5e-3, 0.25));
         last = record;
     }
-    assert_eq!(last.force_n, 5.0);
+    assert_eq!(last.gains.grasp[0], 5.0);
     let mut last = tick(&params, &mut state, &Input::counts(&counts, Some(Command::Release))).record;
     for _ in 1..100 {
         let record = tick(&params, &mut state, &Input::counts(&counts, None)).record;
-        assert!(record.force_n < last.force_n && record.attitude_stiffness_nm < last.attitude_stiffness_nm);
-        assert!((record.integral_gain_nm_rad - 50.0 * record.attitude_stiffness_nm).abs() < 1e-6);
+        assert!(record.gains.grasp[0] < last.gains.grasp[0] && record.gains.grasp[1] < last.gains.grasp[1]);
+        assert!((record.gains.integral[0] - 50.0 * record.gains.grasp[1]).abs() < 1e-6);
         assert_eq!(record.mode, Mode::Releasing);
         last = record;
     }
-    assert_eq!((last.force_n, last.attitude_stiffness_nm, last.integral_gain_nm_rad), (0.0, 0.0, 0.0));
+    assert_eq!((last.gains.grasp[0], last.gains.grasp[1], last.gains.integral[0]), (0.0, 0.0, 0.0));
     let record = tick(&params, &mut state, &Input::counts(&counts, None)).record;
     assert_eq!((record.mode, state.latch()), (Mode::Armed, None));
 }
@@ -174,7 +175,7 @@ fn refused_commands_are_answered_with_the_reason() {
 #[test]
 fn each_limit_shows_in_the_record() {
     let mut config = config();
-    config.law.force_n = 500.0;
+    config.laws.gains.grasp[0] = 500.0;
     config.supervisor.soft_start_ms = 0;
     let params = params(&config);
     let mut state = in_mode(&params, Mode::Armed);
@@ -254,7 +255,7 @@ fn a_joint_that_turns_too_fast_is_a_fault() {
 #[test]
 fn a_torque_at_its_limit_for_too_long_is_a_fault() {
     let mut config = config();
-    config.law.force_n = 500.0;
+    config.laws.gains.grasp[0] = 500.0;
     config.supervisor.soft_start_ms = 0;
     config.limits.slew_nm_s = None;
     let params = params(&config);
@@ -299,7 +300,7 @@ fn what_is_not_finite_is_a_fault_and_never_a_torque() {
 #[test]
 fn gains_that_overflow_are_a_fault_even_behind_a_torque_limit() {
     let mut config = config();
-    config.law.damping_nm_s[4] = f32::MAX;
+    config.laws.hold.damping_nm_s[4] = f32::MAX;
     let params: TestParams = params(&config);
     let mut state = in_mode(&params, Mode::Armed);
     let mut speeds = [0.0; 12];
@@ -350,29 +351,44 @@ fn parameters_out_of_range_are_named_with_their_joint() {
         let mut config = config();
         change(&mut config);
         let error = TestParams::new(common::hand(), &config).unwrap_err();
-        (error.parameter, error.joint)
+        (error.parameter.to_string(), error.joint)
     };
-    assert_eq!(error(|c| c.period_us = 0), ("period_us", None));
-    assert_eq!(error(|c| c.estimator.bandwidth_hz = 0.0), ("estimator.bandwidth_hz", None));
-    assert_eq!(error(|c| c.estimator.encoders[7].rad_per_count = 0.0), ("estimator.rad_per_count", Some(7)));
-    assert_eq!(error(|c| c.law.damping_nm_s[7] = -1.0), ("damping_nm_s", Some(7)));
-    assert_eq!(error(|c| c.limits.torque_nm = Some(with(1.0, 7, 0.0))), ("limits.torque_nm", Some(7)));
-    assert_eq!(error(|c| c.limits.slew_nm_s = Some(with(1.0, 7, f32::NAN))), ("limits.slew_nm_s", Some(7)));
-    let stops = |change: fn(&mut blindgrasp_shared::limit::StopConfig<12>)| {
-        let mut config: Config<12> = config();
-        change(config.limits.stops.as_mut().unwrap());
-        let error = TestParams::new(common::hand(), &config).unwrap_err();
-        (error.parameter, error.joint)
-    };
-    assert_eq!(stops(|s| s.margin_rad[7] = 2.1), ("limits.stops.margin_rad", Some(7)));
-    assert_eq!(stops(|s| s.stiffness_nm_rad[7] = -1.0), ("limits.stops.stiffness_nm_rad", Some(7)));
-    assert_eq!(stops(|s| s.damping_nm_s[7] = f32::INFINITY), ("limits.stops.damping_nm_s", Some(7)));
+    assert_eq!(error(|c| c.period_us = 0), ("period_us".to_owned(), None));
+    assert_eq!(error(|c| c.estimator.bandwidth_hz = 0.0), ("estimator.bandwidth_hz".to_owned(), None));
+    assert_eq!(
+        error(|c| c.estimator.encoders[7].rad_per_count = 0.0),
+        ("estimator.rad_per_count".to_owned(), Some(7))
+    );
+    assert_eq!(error(|c| c.laws.hold.damping_nm_s[7] = -1.0), ("damping_nm_s".to_owned(), Some(7)));
+    assert_eq!(
+        error(|c| c.limits.torque_nm = Some(with(1.0, 7, 0.0))),
+        ("limits.torque_nm".to_owned(), Some(7))
+    );
+    assert_eq!(
+        error(|c| c.limits.slew_nm_s = Some(with(1.0, 7, f32::NAN))),
+        ("limits.slew_nm_s".to_owned(), Some(7))
+    );
+    assert_eq!(
+        error(|c| c.limits.stop_margin_rad = Some(with(0.1, 7, 2.1))),
+        ("limits.stops.margin_rad".to_owned(), Some(7))
+    );
+    assert_eq!(
+        error(|c| c.limits.stop_stiffness_nm_rad = Some(with(2.0, 7, -1.0))),
+        ("limits.stops.stiffness_nm_rad".to_owned(), Some(7))
+    );
+    assert_eq!(
+        error(|c| c.limits.stop_damping_nm_s = Some(with(0.01, 7, f32::INFINITY))),
+        ("limits.stops.damping_nm_s".to_owned(), Some(7))
+    );
     let name = "faults.possible_speed_rad_s";
-    assert_eq!(error(|c| c.faults.possible_speed_rad_s = Some(with(1.0, 7, 0.0))), (name, Some(7)));
+    assert_eq!(
+        error(|c| c.faults.possible_speed_rad_s = Some(with(1.0, 7, 0.0))),
+        (name.to_owned(), Some(7))
+    );
     let name = "faults.speed_limit_rad_s";
-    assert_eq!(error(|c| c.faults.speed_limit_rad_s = Some(with(1.0, 7, 0.0))), (name, Some(7)));
-    assert_eq!(error(|c| c.faults.range_slack_rad = Some(-0.1)), ("faults.range_slack_rad", None));
-    assert_eq!(error(|c| c.faults.saturated_ms = Some(u32::MAX)), ("faults.saturated_ms", None));
+    assert_eq!(error(|c| c.faults.speed_limit_rad_s = Some(with(1.0, 7, 0.0))), (name.to_owned(), Some(7)));
+    assert_eq!(error(|c| c.faults.range_slack_rad = Some(-0.1)), ("faults.range_slack_rad".to_owned(), None));
+    assert_eq!(error(|c| c.faults.saturated_ms = Some(u32::MAX)), ("faults.saturated_ms".to_owned(), None));
     let supervisor = SupervisorConfig { soft_start_ms: 0, release_ms: u32::MAX };
     let mut config = config();
     config.supervisor = supervisor;
@@ -425,11 +441,11 @@ fn a_heartbeat_that_stops_lets_go_and_arming_needs_one() {
     let mut last_n = 5.0;
     for _ in 1..100 {
         let record = step(None, false);
-        assert!(record.mode == Mode::Releasing && record.force_n < last_n);
-        last_n = record.force_n;
+        assert!(record.mode == Mode::Releasing && record.gains.grasp[0] < last_n);
+        last_n = record.gains.grasp[0];
     }
     let record = step(None, false);
-    assert_eq!((record.mode, record.force_n), (Mode::Fault, 0.0));
+    assert_eq!((record.mode, record.gains.grasp[0]), (Mode::Fault, 0.0));
     assert_eq!(record.fault, Some(Raised::of_hand(Fault::LinkLost)));
 }
 
@@ -456,8 +472,8 @@ fn late_ticks_are_a_fault_and_the_fall_back_clock_does_not_arm() {
 /// A hand without weight and stops, whose ledger may show so much excess.
 fn ledger_config(excess_j: f32) -> Config<12> {
     let mut config: Config<12> = config();
-    config.law.gravity_m_s2 = None;
-    config.limits.stops = None;
+    config.laws.hold.gravity_m_s2 = None;
+    config.limits.stop_margin_rad = None;
     config.faults = FaultConfig { energy_j: Some(excess_j), ..FaultConfig::LEAST };
     config
 }
@@ -471,7 +487,7 @@ fn work_that_the_potentials_give_is_no_fault() {
     let mut counts = facing_counts();
     let mut output = drive(&params, &mut state, &[], 100);
     let first = output.record.clone();
-    let potential_j = |record: &Record<12>| record.approach_potential_j + record.attitude_potential_j;
+    let potential_j = |record: &Record<12>| record.potentials_j.grasp[0] + record.potentials_j.grasp[1];
     for _ in 0..60 {
         for (count, torque) in counts.iter_mut().zip(output.torques_nm) {
             *count += if torque > 0.0 { 7 } else { -7 };
@@ -566,7 +582,7 @@ fn a_failed_reading_does_no_work() {
 fn a_grasp_is_as_firm_as_asked_for_within_the_limits() {
     let params: TestParams = params(&config());
     let grasp = |force_n, attitude_stiffness_nm, integral_gain_nm_rad| {
-        Command::Grasp(Grasp { force_n, attitude_stiffness_nm, integral_gain_nm_rad })
+        Command::Grasp(Grasp { gains: PerGain::of([force_n, attitude_stiffness_nm, integral_gain_nm_rad]) })
     };
     let counts = facing_counts();
     let mut state = in_mode(&params, Mode::Armed);
@@ -594,14 +610,14 @@ fn a_grasp_is_as_firm_as_asked_for_within_the_limits() {
     assert_eq!(state.mode(), Mode::Armed);
     assert_eq!(refused(&mut state, grasp(Some(2.0), Some(0.01), Some(0.5))), None);
     let record = drive(&params, &mut state, &[], 100).record;
-    let gains = (record.force_n, record.attitude_stiffness_nm, record.integral_gain_nm_rad);
+    let gains = (record.gains.grasp[0], record.gains.grasp[1], record.gains.integral[0]);
     assert_eq!(gains, (2.0, 0.01, 0.5));
     // The same again is done; other gains would be a lie.
     assert_eq!(refused(&mut state, grasp(Some(2.0), Some(0.01), Some(0.5))), None);
     assert_eq!(refused(&mut state, grasp(Some(2.0), Some(0.01), None)), Some(Refusal::Grasping));
     assert_eq!(refused(&mut state, GRASP), Some(Refusal::Grasping));
     let record = drive(&params, &mut state, &[], 1).record;
-    assert_eq!(record.force_n, 2.0);
+    assert_eq!(record.gains.grasp[0], 2.0);
 }
 
 /// The same value for all joints but one.
@@ -625,7 +641,7 @@ proptest! {
     #[test]
     fn whatever_comes_torques_stay_within_their_limits(steps in steps(), start in any::<i32>(), relaxed in any::<bool>()) {
         let mut config = config();
-        config.law.force_n = 200.0;
+        config.laws.gains.grasp[0] = 200.0;
         for encoder in &mut config.estimator.encoders {
             encoder.zero_count = start;
         }

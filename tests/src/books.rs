@@ -9,7 +9,7 @@ use blindgrasp::record::sample::Sample;
 use blindgrasp::scene::Scene;
 use blindgrasp::{MAX_FINGERS, MAX_JOINTS, Posture, sim};
 use blindgrasp_shared::command::{Command, Grasp};
-use blindgrasp_shared::control::{Gains, Grip, Latch};
+use blindgrasp_shared::control::{Grip, Latch, Stance};
 use blindgrasp_shared::telemetry::Record;
 use blindgrasp_shared::tick::{Input, Params, State, tick};
 use std::f64::consts::TAU;
@@ -145,7 +145,7 @@ pub fn keep(scene: &Scene) -> Vec<Page> {
 /// # Panics
 /// If the scene has no law.
 pub fn true_excess_j(scene: &Scene, outcome: &Outcome) -> Vec<f64> {
-    let law = sim::law(scene).unwrap_or_else(|error| panic!("{error}"));
+    let laws = sim::laws(scene).unwrap_or_else(|error| panic!("{error}"));
     let place = |sample: &Sample| {
         let mut angles_rad = [0.0; MAX_JOINTS];
         angles_rad[..sample.angles_rad.len()].copy_from_slice(&sample.angles_rad);
@@ -159,15 +159,10 @@ pub fn true_excess_j(scene: &Scene, outcome: &Outcome) -> Vec<f64> {
     let latch = Latch::of(&posture, &angles_rad);
     let potential_j = |sample: &Sample, turned: &Turned| {
         let (posture, angles_rad) = place(sample);
-        let gains = Gains {
-            force_n: turned.force_n.into(),
-            attitude_stiffness_nm: turned.attitude_stiffness_nm.into(),
-            integral_gain_nm_rad: turned.integral_gain_nm_rad.into(),
-        };
-        let grip = Some(Grip { latch: &latch, gains });
-        let monitor = law.torques(&scene.hand, &posture, &angles_rad, &[0.0; MAX_JOINTS], grip).1;
-        monitor.approach_potential_j + monitor.attitude_potential_j + monitor.integral_potential_j
-            - monitor.weight_potential_j
+        let gains = turned.gains.map(|&gain| gain.into());
+        let stance = Stance { hand: &scene.hand, posture: &posture, angles_rad: &angles_rad };
+        let account = laws.torques(&stance, &[0.0; MAX_JOINTS], Some(&Grip { latch: &latch, gains })).1;
+        account.potentials_j.iter().sum::<f64>() - account.weight_potential_j
     };
     let mut excess_j = vec![0.0];
     for (pair, turned) in samples.windows(2).zip(&outcome.turned) {

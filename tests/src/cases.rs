@@ -3,8 +3,8 @@
 use crate::description::{Description, Placed};
 use crate::numeric::derivative;
 use crate::random::Draw;
-use blindgrasp_shared::control::{Gains, GraspConfig, GraspLaw, Grip, Latch, Monitor};
-use blindgrasp_shared::hand::{Hand, Posture};
+use blindgrasp_shared::control::{Account, Chosen, Grip, Hold, Latch, Laws, LawsConfig, PerGain, Stance};
+use blindgrasp_shared::hand::{Hand, Posture, Wrench};
 use nalgebra::{Matrix3, Vector3};
 
 /// Capacity for joints.
@@ -32,7 +32,7 @@ pub struct Case {
     /// The hand.
     pub hand: RandomHand,
     /// The paper's law: without `u_I`.
-    pub law: GraspLaw<f64, JOINTS>,
+    pub law: Laws<f64, JOINTS>,
     /// Damping of the joints, N m s/rad.
     pub damping: Torques,
     /// Gravity, m/s^2.
@@ -86,24 +86,45 @@ impl Case {
     }
 
     /// What the law does at some speeds, rad/s, with some gains.
-    pub fn with_gains(&self, speeds: &Torques, gains: Gains<f64>) -> (Torques, Monitor<f64>) {
-        let grip = Grip { latch: &self.latch(), gains };
-        self.law.torques(&self.hand, &self.posture(&self.angles), &self.angles, speeds, Some(grip))
+    pub fn with_gains(&self, speeds: &Torques, gains: PerGain<f64>) -> (Torques, Account<f64>) {
+        self.with_grip(&self.angles, speeds, Some(&Grip { latch: &self.latch(), gains }))
+    }
+
+    /// What the law does at some angles, rad, and speeds, rad/s, in some grip.
+    pub fn with_grip(
+        &self,
+        angles: &Torques,
+        speeds: &Torques,
+        grip: Option<&Grip<'_, f64, JOINTS, FINGERS>>,
+    ) -> (Torques, Account<f64>) {
+        let stance = Stance { hand: &self.hand, posture: &self.posture(angles), angles_rad: angles };
+        self.law.torques(&stance, speeds, grip)
+    }
+
+    /// The wrenches of `u_s` at full force.
+    pub fn approach_wrenches(&self, posture: &Posture<f64, JOINTS, FINGERS>) -> [Wrench<f64>; FINGERS] {
+        self.law.grasp.approach_wrenches(&self.hand, posture, FORCE_N)
+    }
+
+    /// The wrenches of `u_st` at full stiffness.
+    pub fn attitude_wrenches(
+        &self,
+        posture: &Posture<f64, JOINTS, FINGERS>,
+        latch: &Latch<f64, JOINTS, FINGERS>,
+    ) -> [Wrench<f64>; FINGERS] {
+        self.law.grasp.attitude_wrenches(&self.hand, posture, &latch.grasp, K_ST_NM)
     }
 
     /// What the law knows of itself.
-    pub fn monitor(&self) -> Monitor<f64> {
-        self.with_gains(&self.speeds, *self.law.gains()).1
+    pub fn monitor(&self) -> Account<f64> {
+        self.with_gains(&self.speeds, self.law.gains()).1
     }
 
     /// Torques at some speeds, with shares of the force and of the attitudes' stiffness.
     pub fn torques(&self, speeds: &Torques, shares: (f64, f64)) -> Torques {
-        let Gains { force_n, attitude_stiffness_nm, .. } = *self.law.gains();
-        let gains = Gains {
-            force_n: force_n * shares.0,
-            attitude_stiffness_nm: attitude_stiffness_nm * shares.1,
-            ..Gains::none()
-        };
+        let [force_n, attitude_stiffness_nm] = self.law.gains().grasp;
+        let grasp = [force_n * shares.0, attitude_stiffness_nm * shares.1];
+        let gains = PerGain { grasp, ..PerGain::all(0.0) };
         self.with_gains(speeds, gains).0
     }
 
@@ -168,7 +189,7 @@ impl Case {
     /// The most that the approach could put on a joint, N m: every fingertip's force at the end of the longest lever.
     pub fn approach_scale(&self) -> f64 {
         let reach = (0..self.hand.fingertip_count()).map(|i| self.description.reach_m(i)).fold(0.0, f64::max);
-        let forces = self.law.approach_wrenches(&self.hand, &self.posture(&self.angles));
+        let forces = self.approach_wrenches(&self.posture(&self.angles));
         reach * forces.iter().map(|wrench| wrench.force_n.norm()).sum::<f64>()
     }
 
@@ -185,13 +206,11 @@ impl Case {
 ///
 /// # Panics
 /// If a gain is negative.
-pub fn law(hand: &RandomHand, k_st: f64, damping: &Torques, gravity: &Vector3<f64>) -> GraspLaw<f64, JOINTS> {
-    let config = GraspConfig {
-        force_n: FORCE_N,
-        attitude_stiffness_nm: k_st,
-        integral_gain_nm_rad: 0.0,
-        damping_nm_s: *damping,
-        gravity_m_s2: Some(*gravity),
+pub fn law(hand: &RandomHand, k_st: f64, damping: &Torques, gravity: &Vector3<f64>) -> Laws<f64, JOINTS> {
+    let config = LawsConfig {
+        gains: PerGain { grasp: [FORCE_N, k_st], ..PerGain::all(0.0) },
+        chosen: Chosen::ALL,
+        hold: Hold { damping_nm_s: *damping, gravity_m_s2: Some(*gravity) },
     };
     config.prepare(hand).expect("the gains are good")
 }

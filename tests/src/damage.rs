@@ -10,9 +10,10 @@ mod random;
 
 use crate::conversation::frame;
 use blindgrasp_shared::command::{Command, Grasp};
+use blindgrasp_shared::control::PerGain;
 use blindgrasp_shared::link::Receiver;
 use blindgrasp_shared::link::message::{Packet, Request, Sample, Signals};
-use blindgrasp_shared::settings::Parameter;
+use blindgrasp_shared::parameters::Parameter;
 use blindgrasp_shared::telemetry::List;
 use line::Damage;
 use random::Random;
@@ -119,7 +120,9 @@ impl Stretches {
         let index = random.below(JOINTS) as u8;
         match random.below(9) {
             0 => Request::Command(Command::Arm),
-            1 => Request::Command(Command::Grasp(Grasp { force_n: Some(5.0), ..Grasp::CONFIGURED })),
+            1 => Request::Command(Command::Grasp(Grasp {
+                gains: PerGain { grasp: [Some(5.0), None], ..PerGain::all(None) },
+            })),
             2 => Request::Command(Command::Release),
             3 => Request::Command(Command::ClearFault),
             4 => Request::Heartbeat,

@@ -11,7 +11,7 @@ use blindgrasp::plant::friction::JointFriction;
 use blindgrasp::plant::polyhedron::Polyhedron;
 use blindgrasp::plant::{Motion, ObjectModel, Plant, PlantModel};
 use blindgrasp::{Hand, MAX_FINGERS, MAX_JOINTS, Posture};
-use blindgrasp_shared::control::{GraspConfig, GraspLaw, Latch, Monitor};
+use blindgrasp_shared::control::{Account, Chosen, Hold, Latch, Laws, LawsConfig, PerGain, Stance};
 use blindgrasp_shared::math::Real;
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 
@@ -90,8 +90,8 @@ pub struct Grasp {
     pub model: PlantModel,
     /// Where a run starts; the latch is taken there.
     pub start: Motion,
-    /// The grasp law.
-    pub law: GraspLaw<f64, MAX_JOINTS>,
+    /// The laws.
+    pub laws: Laws<f64, MAX_JOINTS>,
     /// How the hand stands at the start.
     pub latch: Latch<f64, MAX_JOINTS, MAX_FINGERS>,
 }
@@ -117,17 +117,16 @@ impl Grasp {
             Some(k) => DAMPING_NM_S[k % FINGER_JOINTS],
             None => ARM_DAMPING_NM_S,
         });
-        let config = GraspConfig {
-            force_n: FORCE_N,
-            attitude_stiffness_nm: ATTITUDE_STIFFNESS_NM,
-            integral_gain_nm_rad: 0.0,
-            damping_nm_s,
-            gravity_m_s2: Some(GRAVITY_M_S2),
+        let config = LawsConfig {
+            gains: PerGain { grasp: [FORCE_N, ATTITUDE_STIFFNESS_NM], ..PerGain::all(0.0) },
+            chosen: Chosen::ALL,
+            hold: Hold { damping_nm_s, gravity_m_s2: Some(GRAVITY_M_S2) },
         };
-        let law = config.prepare(&hand).expect("the gains of Table VII are good");
+        let laws = config.prepare(&hand).expect("the gains of Table VII are good");
         let faces =
             held.contacts.iter().map(|&(face, _)| face_contact(&held.shape, face)).collect::<Vec<_>>();
-        let centres = equilibrium_centres(held, &faces, &fingertip, law.approach_stiffness_n_m());
+        let centres =
+            equilibrium_centres(held, &faces, &fingertip, laws.grasp.approach_stiffness_n_m(FORCE_N));
         let angles_rad = reach(&hand, trunk, &centres);
         let mut posture = Posture::at_base();
         hand.forward_kinematics(&angles_rad, &mut posture);
@@ -146,7 +145,7 @@ impl Grasp {
             pushes: Vec::new(),
         };
         let start = Motion::at_rest(angles_rad, held.position_m, held.attitude);
-        Self { description, model, start, law, latch: Latch::of(&posture, &angles_rad) }
+        Self { description, model, start, laws, latch: Latch::of(&posture, &angles_rad) }
     }
 
     /// The plant at the start.
@@ -161,10 +160,10 @@ impl Grasp {
     }
 
     /// The law at the plant's motion.
-    fn law_at(&self, plant: &Plant) -> (JointVector, Monitor<f64>) {
+    fn law_at(&self, plant: &Plant) -> (JointVector, Account<f64>) {
         let Motion { angles_rad, speeds_rad_s, .. } = plant.motion();
-        let grip = self.law.grip(&self.latch);
-        self.law.torques(&self.model.hand, plant.posture(), angles_rad, speeds_rad_s, Some(grip))
+        let stance = Stance { hand: &self.model.hand, posture: plant.posture(), angles_rad };
+        self.laws.torques(&stance, speeds_rad_s, Some(&self.laws.grip(&self.latch)))
     }
 
     /// The law's torques for the plant's motion, N m.
@@ -177,8 +176,8 @@ impl Grasp {
         let monitor = self.law_at(plant).1;
         plant.kinetic_energy_j()
             + plant.elastic_energy_j()
-            + monitor.approach_potential_j
-            + monitor.attitude_potential_j
+            + monitor.potentials_j.grasp[0]
+            + monitor.potentials_j.grasp[1]
     }
 
     /// Advances a plant by some sub-steps under the law, and shows it solved at the beginning of each.

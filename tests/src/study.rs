@@ -74,7 +74,7 @@ impl Study {
         let runs = placed.as_ref().ok().map(|placement| {
             let file = &placement.scene.file;
             let mut without = file.clone();
-            without.control.attitude_stiffness_nm = 0.0;
+            without.control.gains.grasp[1] = 0.0;
             let real = SceneFile {
                 object: file.object.clone(),
                 pose: file.pose.clone(),

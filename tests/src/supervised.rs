@@ -9,6 +9,7 @@ use blindgrasp::sim::injection::{Injection, Kind};
 use blindgrasp::sim::{Run, Simulation, model};
 use blindgrasp::{MAX_FINGERS, MAX_JOINTS, Posture};
 use blindgrasp_shared::command::Command;
+use blindgrasp_shared::control::PerGain;
 use blindgrasp_shared::event::{Event, Events};
 use blindgrasp_shared::fault::Raised;
 use blindgrasp_shared::limit::Limiting;
@@ -50,14 +51,10 @@ pub struct Turned {
     pub speeds_rad_s: [f32; MAX_JOINTS],
     /// What limited each joint.
     pub limiting: [Limiting; MAX_JOINTS],
-    /// The force `f_d` that acts, N.
-    pub force_n: f32,
-    /// The attitude stiffness `K_st` that acts, N m.
-    pub attitude_stiffness_nm: f32,
-    /// The gain `K_I` of the earlier law that acts, N m/rad.
-    pub integral_gain_nm_rad: f32,
-    /// Potentials of the law: approach, attitudes, integral, J.
-    pub potentials_j: [f32; 3],
+    /// The gains that act.
+    pub gains: PerGain<f32>,
+    /// The potential of each, J.
+    pub potentials_j: PerGain<f32>,
     /// Work of the motors since the grasp began, J.
     pub work_j: f32,
     /// What the law's damping took of it, J.
@@ -104,14 +101,8 @@ impl Controller for Supervised {
                 torques_nm: output.torques_nm,
                 speeds_rad_s: *self.state.speeds_rad_s(),
                 limiting,
-                force_n: record.force_n,
-                attitude_stiffness_nm: record.attitude_stiffness_nm,
-                integral_gain_nm_rad: record.integral_gain_nm_rad,
-                potentials_j: [
-                    record.approach_potential_j,
-                    record.attitude_potential_j,
-                    record.integral_potential_j,
-                ],
+                gains: record.gains,
+                potentials_j: record.potentials_j,
                 work_j: record.work_j,
                 damped_j: record.damped_j,
                 excess_j: record.excess_j,
@@ -135,7 +126,7 @@ impl Controller for Supervised {
             torques_nm,
             angles_rad: *self.state.angles_rad(),
             speeds_rad_s: *self.state.speeds_rad_s(),
-            force_n: record.force_n,
+            force_n: record.gains.grasp[0],
             mode: record.mode,
             fault: record.fault,
         })

@@ -1,7 +1,7 @@
 //! The grasp law against the paper's formulas as they are printed: Eqs. 30-34 and 59 for the torques, Eqs. 43 and 44
 //! for the potentials.
 
-use blindgrasp_shared::control::Latch;
+use blindgrasp_shared::control::{Latch, Stance};
 use blindgrasp_shared::hand::Wrench;
 use blindgrasp_tests::cases::{Case, JOINTS, K_ST_NM, RandomHand, cases, law};
 use blindgrasp_tests::numeric::Errors;
@@ -24,7 +24,7 @@ fn the_approach_is_the_negative_gradient_of_its_potential() {
         }
         let monitor = case.monitor();
         let potential = case.approach_potential(&case.description.placed(&case.angles));
-        potentials.add((monitor.approach_potential_j - potential) / case.approach_scale());
+        potentials.add((monitor.potentials_j.grasp[0] - potential) / case.approach_scale());
     }
     println!("u_s against the gradient of Eq. 43: {errors}; V_s: {potentials}");
     assert!(errors.largest() < 1e-10);
@@ -53,8 +53,8 @@ fn the_relative_attitudes_are_the_negative_gradient_of_their_potential() {
         // The law's has the constant that makes it zero at the latch.
         let expected =
             case.attitude_potential(&case.tip_frames(&offsets, &case.angles), &then) + 3.0 * n * K_ST_NM;
-        potentials.add((monitor.attitude_potential_j - expected) / (3.0 * n * K_ST_NM));
-        assert!(monitor.attitude_potential_j >= 0.0);
+        potentials.add((monitor.potentials_j.grasp[1] - expected) / (3.0 * n * K_ST_NM));
+        assert!(monitor.potentials_j.grasp[1] >= 0.0);
     }
     println!("u_st against the gradient of Eq. 44: {errors}; V_st: {potentials}");
     assert!(errors.largest() < 1e-10);
@@ -86,7 +86,7 @@ fn moments_are_those_of_the_print() {
     let (mut same, mut other) = (Errors::new(), Errors::new());
     let mut pairs = 0;
     for mut case in cases(3000, 1000) {
-        let moments = case.law.attitude_wrenches(&case.hand, &case.posture(&case.angles), &case.latch());
+        let moments = case.attitude_wrenches(&case.posture(&case.angles), &case.latch());
         let (now, then) = (case.posture(&case.angles), case.posture(&case.latched));
         let n = case.hand.fingertip_count();
         pairs += usize::from(n == 2);
@@ -126,7 +126,7 @@ fn two_fingers_are_neighbours_twice() {
     case.angles = case.latched;
     case.angles[0] += 0.4;
     let posture = case.posture(&case.angles);
-    let wrenches = case.law.attitude_wrenches(&case.hand, &posture, &case.latch());
+    let wrenches = case.attitude_wrenches(&posture, &case.latch());
     let expected =
         posture.link(0).axis() * (-4.0 * K_ST_NM * blindgrasp_shared::math::Real::sine_cosine(0.4).0);
     // A few roundings of numbers of the size of `4 K_st`.
@@ -165,10 +165,7 @@ fn a_trunk_feels_neither_term() {
         let (posture, latch) = (case.posture(&case.angles), case.latch());
         let n = case.hand.fingertip_count();
         let about = case.draw.vector(0.5);
-        for wrenches in [
-            case.law.approach_wrenches(&case.hand, &posture),
-            case.law.attitude_wrenches(&case.hand, &posture, &latch),
-        ] {
+        for wrenches in [case.approach_wrenches(&posture), case.attitude_wrenches(&posture, &latch)] {
             let moment_of = |i: usize, wrench: &Wrench<f64>| {
                 wrench.moment_nm + (posture.centres_m[i] - about).cross(&wrench.force_n)
             };
@@ -233,11 +230,11 @@ fn nothing_pulls_at_the_attitudes_at_the_latch() {
     for mut case in cases(7000, 300) {
         case.angles = case.latched;
         let (posture, latch) = (case.posture(&case.angles), case.latch());
-        for wrench in case.law.attitude_wrenches(&case.hand, &posture, &latch) {
+        for wrench in case.attitude_wrenches(&posture, &latch) {
             moments.add(wrench.moment_nm.norm() / K_ST_NM);
         }
         let monitor = case.monitor();
-        potentials.add(monitor.attitude_potential_j / K_ST_NM);
+        potentials.add(monitor.potentials_j.grasp[1] / K_ST_NM);
     }
     println!("at the latch: B_st {moments}; V_st {potentials}");
     assert!(moments.largest() < 1e-15);
@@ -252,22 +249,21 @@ fn normal_only_knows_no_latch() {
         let normal_only = law(&case.hand, 0.0, &case.damping, &case.gravity);
         let posture = case.posture(&case.angles);
         let latches = [case.latch(), Latch::of(&posture, &case.angles)];
+        let stance = Stance { hand: &case.hand, posture: &posture, angles_rad: &case.angles };
         let approach = case.torques(&case.speeds, (1.0, 0.0));
         for latch in &latches {
             let grip = normal_only.grip(latch);
-            let (torques, monitor) =
-                normal_only.torques(&case.hand, &posture, &case.angles, &case.speeds, Some(grip));
+            let (torques, monitor) = normal_only.torques(&stance, &case.speeds, Some(&grip));
             assert_eq!(torques, approach);
-            assert_eq!(monitor.attitude_potential_j, 0.0);
+            assert_eq!(monitor.potentials_j.grasp[1], 0.0);
         }
         let weight = case.hand.gravity_torques(&posture, &case.gravity);
-        let pulls = case.hand.fingertip_torques(&posture, &case.law.approach_wrenches(&case.hand, &posture));
+        let pulls = case.hand.fingertip_torques(&posture, &case.approach_wrenches(&posture));
         let expected: [f64; JOINTS] = std::array::from_fn(|k| pulls[k] + weight[k]);
-        let (angles, rest) = (&case.angles, [0.0; JOINTS]);
-        let still =
-            normal_only.torques(&case.hand, &posture, angles, &rest, Some(normal_only.grip(&latches[0])));
+        let rest = [0.0; JOINTS];
+        let still = normal_only.torques(&stance, &rest, Some(&normal_only.grip(&latches[0])));
         assert_eq!(still.0, expected);
-        let released = case.law.torques(&case.hand, &posture, angles, &rest, None).0;
+        let released = case.law.torques(&stance, &rest, None).0;
         assert_eq!(released, weight);
         case.speeds = [0.0; JOINTS];
         assert_eq!(case.torques(&case.speeds, (0.0, 0.0)), released);

@@ -3,7 +3,7 @@
 
 use blindgrasp::scene::Scene;
 use blindgrasp::sim::Simulation;
-use blindgrasp_shared::control::Gains;
+use blindgrasp_shared::control::PerGain;
 use blindgrasp_tests::cases::{Case, JOINTS, K_I_NM_RAD, K_ST_NM, Torques, cases};
 use blindgrasp_tests::numeric::{Errors, derivative};
 use nalgebra::{DMatrix, DVector, Vector3};
@@ -11,13 +11,14 @@ use nalgebra::{DMatrix, DVector, Vector3};
 const STILL: Torques = [0.0; JOINTS];
 
 /// `u_I` alone.
-fn integral() -> Gains<f64> {
-    Gains { integral_gain_nm_rad: K_I_NM_RAD, ..Gains::none() }
+fn integral() -> PerGain<f64> {
+    PerGain { integral: [K_I_NM_RAD], ..PerGain::all(0.0) }
 }
 
 /// What `u_I` adds to the torques.
 fn pull_back(case: &Case) -> Torques {
-    let (with, without) = (case.with_gains(&STILL, integral()).0, case.with_gains(&STILL, Gains::none()).0);
+    let (with, without) =
+        (case.with_gains(&STILL, integral()).0, case.with_gains(&STILL, PerGain::all(0.0)).0);
     std::array::from_fn(|k| with[k] - without[k])
 }
 
@@ -42,7 +43,7 @@ fn it_is_the_negative_gradient_of_its_potential() {
             errors.add((torque + derivative(1.0 / 512.0, along)) / (K_I_NM_RAD + case.weight_scale()));
         }
         let monitor = case.with_gains(&case.speeds, integral()).1;
-        potentials.add((monitor.integral_potential_j - potential(&case.angles)) / K_I_NM_RAD);
+        potentials.add((monitor.potentials_j.integral[0] - potential(&case.angles)) / K_I_NM_RAD);
     }
     println!("u_I against the gradient of its potential: {errors}; V_I: {potentials}");
     assert!(errors.largest() < 1e-12);
@@ -53,11 +54,11 @@ fn it_is_the_negative_gradient_of_its_potential() {
 #[test]
 fn it_is_zero_at_the_latch_and_without_its_gain() {
     for mut case in cases(200, 100) {
-        let (paper, monitor) = case.with_gains(&case.speeds, *case.law.gains());
-        assert_eq!((case.torques(&case.speeds, (1.0, 1.0)), monitor.integral_potential_j), (paper, 0.0));
+        let (paper, monitor) = case.with_gains(&case.speeds, case.law.gains());
+        assert_eq!((case.torques(&case.speeds, (1.0, 1.0)), monitor.potentials_j.integral[0]), (paper, 0.0));
         case.angles = case.latched;
         let monitor = case.with_gains(&case.speeds, integral()).1;
-        assert_eq!((pull_back(&case), monitor.integral_potential_j), (STILL, 0.0));
+        assert_eq!((pull_back(&case), monitor.potentials_j.integral[0]), (STILL, 0.0));
     }
 }
 

@@ -151,11 +151,14 @@ fn lets_go(scene: &Scene, outcome: &Outcome, at: u64, ticks: usize) -> End {
         let (before, now) = (&turned[tick - 1], &turned[tick]);
         assert_eq!(now.mode, Mode::Releasing, "tick {tick}");
         let left = 1.0 - (tick - found + 1) as f32 / ticks as f32;
-        assert!((now.force_n - left * full.force_n).abs() < 1e-4 && now.force_n < before.force_n);
-        assert!(now.attitude_stiffness_nm < before.attitude_stiffness_nm);
+        assert!(
+            (now.gains.grasp[0] - left * full.gains.grasp[0]).abs() < 1e-4
+                && now.gains.grasp[0] < before.gains.grasp[0]
+        );
+        assert!(now.gains.grasp[1] < before.gains.grasp[1]);
     }
-    assert_eq!(turned[over - 1].force_n, 0.0);
-    assert_eq!(turned[over - 1].attitude_stiffness_nm, 0.0);
+    assert_eq!(turned[over - 1].gains.grasp[0], 0.0);
+    assert_eq!(turned[over - 1].gains.grasp[1], 0.0);
     let strongest_nm = largest(full.torques_nm.map(|torque| f64::from(torque.abs())));
     for joint in 0..scene.joints.len() {
         let magnitude = |tick: usize| turned[tick].torques_nm[joint].abs();
@@ -303,7 +306,7 @@ fn bent_fingers() -> Row {
         let (scene, _) = healthy(name);
         // What a healthy, pushed hand does about frozen counters is looked at below.
         let mut config = config(&scene);
-        config.faults.frozen = None;
+        config.faults.frozen_ms = None;
         let slack_rad = f64::from(config.faults.range_slack_rad.expect("it is watched"));
         for joint in [1, 5, 9] {
             let course = bent(joint, -0.3);
@@ -340,7 +343,7 @@ fn pushed_off(outcome: &Outcome, course: &Course, at: u64) -> End {
 
 fn changed(scene: &Scene, change: impl FnOnce(&mut Config<MAX_JOINTS>)) -> Config<MAX_JOINTS> {
     let mut config = config(scene);
-    config.faults.frozen = None;
+    config.faults.frozen_ms = None;
     change(&mut config);
     config
 }
@@ -388,8 +391,8 @@ fn overflows() -> Row {
     let mut row = Row::new(Fault::NotFinite, "a force of 3e38 N, without limits", "cube");
     let (scene, _) = healthy("cube");
     let config = changed(&scene, |config| {
-        config.law.force_n = 3e38;
-        config.limits.force_n = None;
+        config.laws.gains.grasp[0] = 3e38;
+        config.limits.gains.grasp[0] = None;
         config.supervisor.soft_start_ms = 0;
     });
     let outcome = run_with(&scene, &config, &Course::default());
@@ -507,7 +510,7 @@ fn frozen_in_a_grasp() -> Vec<[String; 3]> {
             let armed = outcome.turned.iter().position(|turned| turned.mode == Mode::Armed);
             assert_eq!(armed, Some(1500), "the hand lets go all the same");
             for pair in outcome.turned[1200..1500].windows(2) {
-                assert!(pair[1].force_n < pair[0].force_n);
+                assert!(pair[1].gains.grasp[0] < pair[0].gains.grasp[0]);
             }
         }
     }
@@ -685,7 +688,8 @@ fn nothing_is_found_where_nothing_is_wrong() {
         if shipped.sensors.ideal {
             continue;
         }
-        let forces = [0.4, 2.0].map(|factor| format!("control.force_n={}", factor * shipped.control.force_n));
+        let forces =
+            [0.4, 2.0].map(|factor| format!("control.force_n={}", factor * shipped.control.force_n()));
         for condition in conditions.into_iter().chain(forces.iter().map(String::as_str)) {
             let scene = scene(name, &["duration_s=2", condition]);
             let outcome = run(&scene, &Course::default());

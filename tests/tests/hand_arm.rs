@@ -196,8 +196,8 @@ fn the_files_have_the_numbers_of_the_tables() {
         [("hand-arm", 5.238e-2), ("hand-arm-consistent", 5.238e-2), ("hand-arm-firm", 0.2)]
     {
         let scene = load(name, &[]);
-        assert_eq!(scene.control.force_n, 10.0);
-        assert_eq!(scene.control.attitude_stiffness_nm, stiffness_nm);
+        assert_eq!(scene.control.force_n(), 10.0);
+        assert_eq!(scene.control.attitude_stiffness_nm(), stiffness_nm);
         let angles: Vec<f64> = ARM_RAD.into_iter().chain(FINGERS_RAD.concat()).collect();
         assert_eq!(scene.start.angles_rad, angles);
         assert_eq!(scene.start.position_m, POSITION_M);
@@ -262,7 +262,7 @@ fn with_the_printed_gains_it_is_held_for_long_but_not_for_ever() {
     assert!(creeping.contacts.iter().any(|contact| contact.force_residual_n.norm() > 0.5));
     // At rest, u_st would have to hold what the tangential part of the law's pull turns (Eqs. 53 and 54). What it has at the
     // most, in any attitude, is about half of that for fingers 2 and 3.
-    let most_nm = 4.0 * load("hand-arm", &[]).control.attitude_stiffness_nm;
+    let most_nm = 4.0 * load("hand-arm", &[]).control.attitude_stiffness_nm();
     for contact in &run.samples[0].contacts[1..] {
         let [lambda_x, lambda_z] = contact.lambda_n;
         let (x, z) = (lambda_x + contact.force_residual_n.x, lambda_z + contact.force_residual_n.z);

@@ -10,12 +10,13 @@ use blindgrasp::scene::HandModel;
 use blindgrasp::wire::{Packet, Record, Request};
 use blindgrasp::{MAX_FINGERS, MAX_JOINTS};
 use blindgrasp_shared::command::{Command, Grasp, Refusal};
+use blindgrasp_shared::control::PerGain;
 use blindgrasp_shared::event::Event;
 use blindgrasp_shared::fault::{Fault, Raised};
 use blindgrasp_shared::identity::{Clock, ResetCause, UNITS};
 use blindgrasp_shared::link::Listener;
 use blindgrasp_shared::link::message::{self, Sample, Signals, not_understood};
-use blindgrasp_shared::settings::Parameter;
+use blindgrasp_shared::parameters::{Parameter, Setting};
 use blindgrasp_shared::supervisor::Mode;
 use blindgrasp_shared::telemetry::burst::AFTER;
 use blindgrasp_shared::telemetry::dense::digest;
@@ -60,8 +61,8 @@ fn requests() -> Vec<Request> {
     let commands = Command::ALL.into_iter().filter(|command| *command != Command::Stop).map(Request::Command);
     let others = [
         Request::Heartbeat,
-        set(Parameter::Force, 0, 1.0),
-        get(Parameter::Force, 0),
+        set(Parameter::gain(0), 0, 1.0),
+        get(Parameter::gain(0), 0),
         telemetry(1, Signals::ALL),
         Request::Joints(Sample { counts: List::default(), failed: None, late: false }),
     ];
@@ -99,7 +100,7 @@ fn without_counters_it_is_in_fault_1_and_stays_there() {
         assert_eq!(record.torques_nm.as_slice(), [0.0; JOINTS]);
     };
     check(&mut host);
-    let grasp = Grasp { force_n: Some(f32::NAN), ..Grasp::CONFIGURED };
+    let grasp = Grasp { gains: PerGain { grasp: [Some(f32::NAN), None], ..PerGain::all(None) } };
     for (command, refusal) in [
         (Command::Arm, Some(Refusal::InFault)),
         (Command::Disarm, Some(Refusal::InFault)),
@@ -163,17 +164,19 @@ fn what_it_does_not_take_it_refuses_by_name() {
     let sample = Sample { counts: List::first_of([5; 24], 12), failed: None, late: false };
     for (request, refusal) in [
         (Request::Joints(sample), Refusal::JointsAreReal),
-        (get(Parameter::Force, 1), Refusal::NoSuchParameter),
-        (get(Parameter::TorqueLimit, 12), Refusal::NoSuchParameter),
-        (get(Parameter::Gravity, 3), Refusal::NoSuchParameter),
+        (get(Parameter::gain(0), 1), Refusal::NoSuchParameter),
+        (get(Parameter::TORQUE_LIMIT, 12), Refusal::NoSuchParameter),
+        (get(Parameter::GRAVITY, 3), Refusal::NoSuchParameter),
         // A hand in a fault is not disarmed.
-        (set(Parameter::Force, 0, 1.0), Refusal::NotDisarmed),
-        (set(Parameter::Force, 0, f32::NAN), Refusal::NotDisarmed),
+        (set(Parameter::gain(0), 0, 1.0), Refusal::NotDisarmed),
+        (set(Parameter::gain(0), 0, f32::NAN), Refusal::NotDisarmed),
     ] {
         assert_eq!(host.ask(request.clone()).refused(), Some(refusal), "{request:?}");
     }
-    match host.ask(get(Parameter::TorqueLimit, 11)).reply() {
-        Reply::Value { parameter: Parameter::TorqueLimit, index: 11, value, .. } => assert_eq!(value, 1.3878),
+    match host.ask(get(Parameter::TORQUE_LIMIT, 11)).reply() {
+        Reply::Value { parameter: Parameter::TORQUE_LIMIT, index: 11, setting, .. } => {
+            assert_eq!(setting.value, 1.3878)
+        }
         other => panic!("{other:?}"),
     }
 
@@ -310,8 +313,11 @@ fn it_keeps_1_khz_and_answers_though_its_line_is_too_slow() {
         for _ in 0..20 {
             // All of it again: after what was lost, the board sends only one record in so many ticks.
             assert_eq!(host.ask(telemetry(1, Signals::ALL)).refused(), None);
-            let heard = host.ask(get(Parameter::Force, 0));
-            assert!(matches!(heard.reply(), Reply::Value { value: 5.0, .. }), "{heard:?}");
+            let heard = host.ask(get(Parameter::gain(0), 0));
+            assert!(
+                matches!(heard.reply(), Reply::Value { setting: Setting { value: 5.0, .. }, .. }),
+                "{heard:?}"
+            );
             asked += 2;
         }
         for record in std::mem::take(&mut host.records) {

@@ -97,8 +97,12 @@ fn the_records_close_the_balance() {
     let (first, last) = (&turned[0], &turned[turned.len() - 1]);
     let excess_j: f64 =
         turned.windows(2).map(|pair| added_j(&pair[0], &pair[1], scene.control.period_s)).sum();
-    let drop_j: f64 =
-        first.potentials_j.iter().zip(&last.potentials_j).map(|(a, b)| f64::from(*a) - f64::from(*b)).sum();
+    let drop_j: f64 = first
+        .potentials_j
+        .iter()
+        .zip(last.potentials_j.iter())
+        .map(|(a, b)| f64::from(*a) - f64::from(*b))
+        .sum();
     let work_j = f64::from(last.work_j) - f64::from(first.work_j);
     let lifted_j = weight_j(to) - weight_j(from);
     let most_j = turned.iter().map(|turned| turned.work_j.abs()).fold(0.0, f32::max);
@@ -144,7 +148,7 @@ fn of_a_fast_loop_nothing_is_left_but_the_damping() {
 fn held(scene: &Scene, course: &Course) -> Option<f64> {
     let mut config = config(scene);
     // What that watch does about hands that are pushed is looked at elsewhere.
-    config.faults.frozen = None;
+    config.faults.frozen_ms = None;
     let outcome = run_with(scene, &config, course);
     let most = outcome.turned.iter().map(|turned| f64::from(turned.excess_j)).fold(0.0, f64::max);
     (outcome.run.summary.grasp_held && outcome.found().is_none()).then_some(most)

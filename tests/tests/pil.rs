@@ -16,10 +16,11 @@ use blindgrasp::sim::injection::{Injection, Kind};
 use blindgrasp::sim::{Run, Simulation};
 use blindgrasp::wire::{Answer, Packet, Request, Sample};
 use blindgrasp_shared::command::{Command, Grasp, Refusal};
+use blindgrasp_shared::control::PerGain;
 use blindgrasp_shared::fault::{Fault, Raised, Reaction};
 use blindgrasp_shared::identity::Clock;
 use blindgrasp_shared::link::message::{self, not_understood};
-use blindgrasp_shared::settings::Parameter;
+use blindgrasp_shared::parameters::{Parameter, Setting};
 use blindgrasp_shared::telemetry::{INTERFACE_VERSION, List};
 use blindgrasp_tests::conversation::{Conversation, Reply, frame};
 use blindgrasp_tests::damage::{JOINTS, Stretches};
@@ -313,29 +314,31 @@ fn values_that_are_no_good_are_refused_by_name() {
     let Answer::Identity { session, .. } = ask(0, 1, hello) else { panic!("no identity") };
     let set = |parameter, index, value| Request::SetParameter { parameter, index, value };
     let grasp = |force_n, attitude_stiffness_nm| {
-        Request::Command(Command::Grasp(Grasp { force_n, attitude_stiffness_nm, ..Grasp::CONFIGURED }))
+        Request::Command(Command::Grasp(Grasp {
+            gains: PerGain { grasp: [force_n, attitude_stiffness_nm], ..PerGain::all(None) },
+        }))
     };
     let integral = |gain| {
-        let grasp = Grasp { integral_gain_nm_rad: Some(gain), ..Grasp::CONFIGURED };
+        let grasp = Grasp { gains: PerGain { integral: [Some(gain)], ..PerGain::all(None) } };
         Request::Command(Command::Grasp(grasp))
     };
     let requests = [
-        (set(Parameter::Force, 0, f32::NAN), Some(Refusal::NotFinite)),
-        (set(Parameter::TorqueLimit, 11, f32::INFINITY), Some(Refusal::NotFinite)),
-        (set(Parameter::Gravity, 2, f32::NEG_INFINITY), Some(Refusal::NotFinite)),
-        (set(Parameter::Force, 0, -1.0), Some(Refusal::OutOfRange)),
-        (set(Parameter::Force, 0, 1e30), Some(Refusal::OutOfRange)),
-        (set(Parameter::HeartbeatTime, 0, 0.5), Some(Refusal::OutOfRange)),
-        (set(Parameter::Damping, 12, 1e-3), Some(Refusal::NoSuchParameter)),
-        (set(Parameter::Force, 1, 1.0), Some(Refusal::NoSuchParameter)),
-        (set(Parameter::SlewLimit, 0, -1.0), Some(Refusal::OutOfRange)),
+        (set(Parameter::gain(0), 0, f32::NAN), Some(Refusal::NotFinite)),
+        (set(Parameter::TORQUE_LIMIT, 11, f32::INFINITY), Some(Refusal::NotFinite)),
+        (set(Parameter::GRAVITY, 2, f32::NEG_INFINITY), Some(Refusal::NotFinite)),
+        (set(Parameter::gain(0), 0, -1.0), Some(Refusal::OutOfRange)),
+        (set(Parameter::gain(0), 0, 1e30), Some(Refusal::OutOfRange)),
+        (set(Parameter::HEARTBEAT_TIME, 0, 0.5), Some(Refusal::OutOfRange)),
+        (set(Parameter::DAMPING, 12, 1e-3), Some(Refusal::NoSuchParameter)),
+        (set(Parameter::gain(0), 1, 1.0), Some(Refusal::NoSuchParameter)),
+        (set(Parameter::SLEW_LIMIT, 0, -1.0), Some(Refusal::OutOfRange)),
         (Request::Command(Command::Grasp(Grasp::CONFIGURED)), Some(Refusal::NotArmed)),
         (Request::Command(Command::Release), Some(Refusal::NotGrasping)),
         (Request::Command(Command::ClearFault), Some(Refusal::NoFault)),
         (Request::Command(Command::Arm), Some(Refusal::NoHeartbeat)),
         (Request::Heartbeat, None),
         (Request::Command(Command::Arm), None),
-        (set(Parameter::Force, 0, 1.0), Some(Refusal::NotDisarmed)),
+        (set(Parameter::gain(0), 0, 1.0), Some(Refusal::NotDisarmed)),
         (grasp(Some(f32::NAN), None), Some(Refusal::NotFinite)),
         (grasp(None, Some(f32::INFINITY)), Some(Refusal::NotFinite)),
         (integral(f32::NAN), Some(Refusal::NotFinite)),
@@ -343,14 +346,14 @@ fn values_that_are_no_good_are_refused_by_name() {
         (grasp(Some(-0.1), None), Some(Refusal::OutOfRange)),
         (grasp(Some(20.1), None), Some(Refusal::OutOfRange)),
         (Request::Command(Command::Stop), None),
-        (set(Parameter::Force, 0, 4.0), None),
+        (set(Parameter::gain(0), 0, 4.0), None),
     ];
     for ((request, refusal), sequence) in requests.into_iter().zip(2..) {
         let expected = refusal.map_or(Answer::Done, Answer::Refused);
         assert_eq!(ask(session, sequence, request.clone()), expected, "{request:?}");
     }
-    let get = Request::GetParameter { parameter: Parameter::Force, index: 0 };
-    assert_eq!(ask(session, 100, get), Answer::Value(4.0));
+    let get = Request::GetParameter { parameter: Parameter::gain(0), index: 0 };
+    assert_eq!(ask(session, 100, get), Answer::Value(Setting { value: 4.0, file: 5.0 }));
 }
 
 /// More requests than can wait for a tick: each is answered, busy or, in a tick of its own, done.

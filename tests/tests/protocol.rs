@@ -7,13 +7,16 @@
 use blindgrasp::MAX_JOINTS;
 use blindgrasp::scene::HandModel;
 use blindgrasp_shared::command::{Answer, Command, Grasp, Refusal};
+use blindgrasp_shared::control::PerGain;
+use blindgrasp_shared::control::{GAINS, Signal};
 use blindgrasp_shared::event::{Event, Events};
 use blindgrasp_shared::fault::{Fault, Raised, Reaction};
 use blindgrasp_shared::identity::{Clock, Crash, CrashKind, Identity, Image, ResetCause, UNITS};
 use blindgrasp_shared::limit::{Limit, Limiting};
 use blindgrasp_shared::link::message::{Packet, Reply, Request, Sample, Signals};
 use blindgrasp_shared::link::{FrameError, HearError, Heard, Listener, Receiver, Sender, encode, most_bytes};
-use blindgrasp_shared::settings::{Each, Parameter};
+use blindgrasp_shared::parameters::{Bound, Each, Parameter, Setting};
+use blindgrasp_shared::signals::Told;
 use blindgrasp_shared::supervisor::{Event as ModeEvent, Mode, Outcome, outcome};
 use blindgrasp_shared::telemetry::snapshot::{PART_BYTES, Part};
 use blindgrasp_shared::telemetry::{INTERFACE_VERSION, List, Record, dense};
@@ -99,9 +102,8 @@ fn limiting(values: &[&[Limit]]) -> List<Limiting, J> {
 
 /// Every request, and some of them more than once.
 fn packets() -> Vec<(&'static str, Packet<J>)> {
-    let grasp = Grasp { force_n: Some(3.5), ..Grasp::CONFIGURED };
-    let earlier =
-        Grasp { attitude_stiffness_nm: Some(0.0), integral_gain_nm_rad: Some(0.25), ..Grasp::CONFIGURED };
+    let grasp = Grasp { gains: PerGain { grasp: [Some(3.5), None], ..PerGain::all(None) } };
+    let earlier = Grasp { gains: PerGain { grasp: [None, Some(0.0)], integral: [Some(0.25)] } };
     let at_rest: Vec<i32> = (0..JOINTS as i32).map(|k| 300 * k - 1500).collect();
     let command = Request::Command;
     let requests = [
@@ -117,9 +119,12 @@ fn packets() -> Vec<(&'static str, Packet<J>)> {
         ("heartbeat", Request::Heartbeat),
         (
             "set a torque limit",
-            Request::SetParameter { parameter: Parameter::TorqueLimit, index: 3, value: 0.25 },
+            Request::SetParameter { parameter: Parameter::TORQUE_LIMIT, index: 3, value: 0.25 },
         ),
-        ("get the heartbeat's time", Request::GetParameter { parameter: Parameter::HeartbeatTime, index: 0 }),
+        (
+            "get the heartbeat's time",
+            Request::GetParameter { parameter: Parameter::HEARTBEAT_TIME, index: 0 },
+        ),
         ("telemetry at full rate, everything", Request::Telemetry { decimation: 1, signals: Signals::FULL }),
         ("no telemetry", Request::Telemetry { decimation: 0, signals: Signals::NONE }),
         (
@@ -171,6 +176,7 @@ const IDENTITY: Identity<'static> = Identity {
     clock: Clock::External,
     reset: ResetCause::PowerOn,
     crash: None,
+    changed: 0,
 };
 
 /// A hand of three joints in a fault.
@@ -264,7 +270,12 @@ fn replies() -> Vec<(&'static str, Reply<'static, J>)> {
         ("refused", answer(Some(Refusal::InFault))),
         (
             "value",
-            Reply::Value { sequence: 0x123e, parameter: Parameter::HeartbeatTime, index: 0, value: 250.0 },
+            Reply::Value {
+                sequence: 0x123e,
+                parameter: Parameter::HEARTBEAT_TIME,
+                index: 0,
+                setting: Setting { value: 200.0, file: 250.0 },
+            },
         ),
         ("record of three joints in a fault", Reply::Record(faulted())),
         ("record of twelve joints", Reply::Record(grasping(64, 1, 20))),
@@ -667,15 +678,16 @@ fn the_tables_of_the_document_are_those_of_the_code() {
         .map(|(k, command): (usize, _)| {
             let fields = match command {
                 Command::Grasp(_) => {
-                    "`force_n`: option of f32; `attitude_stiffness_nm`: option of f32; `integral_gain_nm_rad`: option of f32"
+                    let gains = GAINS.map(|gain| format!("`{}`: option of f32", gain.key));
+                    gains.join("; ")
                 }
-                _ => "",
+                _ => String::new(),
             };
             assert_eq!(payload(&frame(&command))[0], k as u8);
             [k.to_string(), command.words().to_owned(), fields.to_owned()]
         })
         .collect();
-    check(DOCUMENT, "commands", &table(["number", "command", "fields"], &commands));
+    check(DOCUMENT, "commands", &table(["number", "command", "gains"], &commands));
     check(DOCUMENT, "refusals", &table(three, &numbered(Refusal::ALL, |refusal| refusal.words())));
     check(DOCUMENT, "modes", &table(three, &numbered(&Mode::ALL, |mode| mode.words())));
     let faults: Vec<[String; 4]> = Fault::ALL
@@ -689,19 +701,29 @@ fn the_tables_of_the_document_are_those_of_the_code() {
         })
         .collect();
     check(DOCUMENT, "faults", &table(["number", "name", "what is wrong", "what is done"], &faults));
-    let parameters: Vec<[String; 5]> = (0..)
-        .zip(Parameter::ALL)
-        .map(|(k, parameter): (usize, _)| {
-            let each = match parameter.each() {
-                Each::Hand => "0",
-                Each::Joint => "joint",
-                Each::Axis => "axis: x, y, z",
-            };
-            let name = format!("`{parameter:?}`");
-            [k.to_string(), name, format!("`{}`", parameter.key()), each.into(), parameter.words().into()]
-        })
-        .collect();
-    check(DOCUMENT, "parameters", &table(["number", "name", "key", "index", "meaning"], &parameters));
+    let parameters = Parameter::ALL.map(|parameter| {
+        let each = match parameter.each() {
+            Each::Hand => "0",
+            Each::Joint => "joint",
+            Each::Axis => "axis: x, y, z",
+        };
+        let bound = match parameter.bound() {
+            Bound::Free => "",
+            Bound::AtMost => "most",
+            Bound::AtLeast => "least",
+        };
+        let (key, words) = (format!("`{}`", parameter.key()), parameter.words().to_string());
+        [parameter.number().to_string(), key, each.into(), parameter.unit().into(), bound.into(), words]
+    });
+    let head = ["number", "key", "index", "unit", "the file's is the", "meaning"];
+    check(DOCUMENT, "parameters", &table(head, &parameters));
+    let mut signals = Vec::new();
+    Record::BLANK.tell(|told: Told<'_>| {
+        let each = if told.each == Each::Joint { "joint" } else { "" };
+        let Signal { key, unit, words } = told.signal;
+        signals.push([format!("`{key}`"), each.into(), unit.into(), words.into()]);
+    });
+    check(DOCUMENT, "signals", &table(["signal", "of each", "unit", "meaning"], &signals));
     let bits: Vec<[String; 2]> =
         Limit::ALL.map(|limit| [(limit as u8).to_string(), limit.words().to_owned()]).into();
     check(DOCUMENT, "limits", &table(["bit", "what limits the joint"], &bits));

@@ -90,7 +90,8 @@ impl Line {
             period_us: 1000,
         };
         let clock = Clock::External;
-        let identity = Identity { image, units: UNITS, clock, reset: ResetCause::Unknown, crash: None };
+        let identity =
+            Identity { image, units: UNITS, clock, reset: ResetCause::Unknown, crash: None, changed: 0 };
         Self {
             device: Device::new(Params::new(scene.hand.cast(), config).expect("parameters"), identity),
             burst: Box::new(Burst::new()),
@@ -279,7 +280,7 @@ impl Controller for Line {
             torques_nm,
             angles_rad: *state.angles_rad(),
             speeds_rad_s: *state.speeds_rad_s(),
-            force_n: outputs.record.force_n,
+            force_n: outputs.record.gains.grasp[0],
             mode: outputs.record.mode,
             fault: outputs.record.fault,
         })
@@ -329,8 +330,8 @@ fn a_minute_at_the_speed_of_the_motors_loses_nothing() {
     let mut config = hand_config();
     config.faults = FaultConfig { heartbeat_ms: config.faults.heartbeat_ms, ..FaultConfig::LEAST };
     for (speed_rad_s, integral_gain_nm_rad) in [(20.0, 0.0), (70.0, 0.0), (70.0, 0.02), (185.0, 0.0)] {
-        config.law.integral_gain_nm_rad = integral_gain_nm_rad;
-        config.limits.integral_gain_nm_rad = Some(integral_gain_nm_rad);
+        config.laws.gains.integral[0] = integral_gain_nm_rad;
+        config.limits.gains.integral[0] = Some(integral_gain_nm_rad);
         let mut line = Line::new(&config, 1e6);
         for tick in 0..60_000 {
             let command = match tick {

@@ -8,7 +8,8 @@ use blindgrasp::device::transport::{Transport, TransportError};
 use blindgrasp::scene::HandModel;
 use blindgrasp::wire::{Answer, Firmware, Record, Request};
 use blindgrasp_shared::command::{self, Command, Grasp, Refusal};
-use blindgrasp_shared::settings::{Each, Parameter};
+use blindgrasp_shared::control::{GAIN_COUNT, GAINS};
+use blindgrasp_shared::parameters::{Bound, Each, Parameter, Setting};
 use clap::Args;
 use std::collections::VecDeque;
 use std::fmt::{Display, Write as _};
@@ -302,13 +303,12 @@ impl Console {
             ("release", []) => Command::Release,
             ("stop", []) => Command::Stop,
             ("clear", []) => Command::ClearFault,
-            ("grasp", [] | [_] | [_, _] | [_, _, _]) => {
-                let value = |at: usize| rest.get(at).map(|word| number(word)).transpose();
-                Command::Grasp(Grasp {
-                    force_n: value(0)?,
-                    attitude_stiffness_nm: value(1)?,
-                    integral_gain_nm_rad: value(2)?,
-                })
+            ("grasp", values) if values.len() <= GAIN_COUNT => {
+                let mut grasp = Grasp::CONFIGURED;
+                for (gain, value) in grasp.gains.iter_mut().zip(values) {
+                    *gain = Some(number(value)?);
+                }
+                Command::Grasp(grasp)
             }
             ("help", []) => {
                 for (word, values, words) in WORDS {
@@ -330,7 +330,7 @@ impl Console {
                 self.talk.ask(self.telemetry(), now);
                 return Ok(());
             }
-            ("get", []) => return self.get(Parameter::ALL, None, now),
+            ("get", []) => return self.get(&Parameter::ALL, None, now),
             ("get", [key]) => return self.get(&[parameter(key)?], None, now),
             ("get", [key, index]) => return self.get(&[parameter(key)?], Some(integer(index)?), now),
             ("set", [key, value]) => return self.set(parameter(key)?, None, number(value)?, now),
@@ -367,11 +367,7 @@ impl Console {
 
     /// The one index, or all that a parameter has.
     fn indices(&self, parameter: Parameter, index: Option<u8>) -> std::ops::Range<u8> {
-        let count = match parameter.each() {
-            Each::Hand => 1,
-            Each::Joint => u8::try_from(self.joint_count).unwrap_or(u8::MAX),
-            Each::Axis => 3,
-        };
+        let count = parameter.count(self.joint_count.into());
         index.map_or(0..count, |index| index..index.saturating_add(1))
     }
 
@@ -524,8 +520,9 @@ impl Console {
         if let Some(raised) = record.reading_failed {
             row("joints", format!("not read: {raised}"));
         }
-        let Record { force_n, attitude_stiffness_nm, integral_gain_nm_rad, .. } = record;
-        row("grasp", format!("{force_n} N, {attitude_stiffness_nm} N m, {integral_gain_nm_rad} N m/rad"));
+        let gains = GAINS.iter().zip(record.gains.iter());
+        let gains = gains.map(|(gain, value)| format!("{value} {}", gain.unit)).collect::<Vec<_>>();
+        row("grasp", gains.join(", "));
         row(
             "energy",
             format!(
@@ -570,7 +567,7 @@ fn lost(error: TransportError) -> anyhow::Error {
 /// What was asked for, as it was typed.
 fn name(request: &Request) -> String {
     let indexed = |parameter: Parameter, index| match parameter.each() {
-        Each::Hand if index == 0 => parameter.key().to_owned(),
+        Each::Hand if index == 0 => parameter.to_string(),
         _ => format!("{parameter}[{index}]"),
     };
     match *request {
@@ -587,8 +584,16 @@ fn name(request: &Request) -> String {
 fn answered(request: &Request, answer: &Answer) -> String {
     match (request, answer) {
         (&Request::Command(command), Answer::Done) => command::Answer { command, refused: None }.to_string(),
-        (Request::GetParameter { parameter, .. }, Answer::Value(value)) => {
-            format!("{} = {value}  ({})", name(request), parameter.words())
+        (Request::GetParameter { parameter, .. }, Answer::Value(Setting { value, file })) => {
+            let file = match parameter.bound() {
+                Bound::Free if value == file => String::new(),
+                Bound::Free => format!("; {file} in the hand's file"),
+                Bound::AtMost => format!("; at most {file}, as in the hand's file"),
+                Bound::AtLeast => format!("; at least {file}, as in the hand's file"),
+            };
+            let unit = if parameter.unit().is_empty() { "" } else { ", " };
+            let words = format!("{}{unit}{}", parameter.words(), parameter.unit());
+            format!("{} = {value}  ({words}{file})", name(request))
         }
         (request, Answer::Refused(refusal)) => format!("{}: refused, {}", name(request), refusal.words()),
         (request, _) => format!("{}: done", name(request)),
@@ -596,8 +601,9 @@ fn answered(request: &Request, answer: &Answer) -> String {
 }
 
 fn parameter(key: &str) -> anyhow::Result<Parameter> {
-    Parameter::ALL.iter().copied().find(|parameter| parameter.key() == key).with_context(|| {
-        let keys = Parameter::ALL.iter().map(|parameter| parameter.key());
+    Parameter::named(key).with_context(|| {
+        let keys = Parameter::ALL.map(|parameter| parameter.to_string());
+        let keys = keys.iter().map(String::as_str);
         format!("`{key}` is no parameter: {}", similar(key, keys).unwrap_or("type `get` for all".to_owned()))
     })
 }

@@ -257,7 +257,7 @@ impl<T: Transport> Client<T> {
                 Ok(Reply::Answer { sequence, refused }) => {
                     (sequence, refused.map_or(Answer::Done, Answer::Refused))
                 }
-                Ok(Reply::Value { sequence, value, .. }) => (sequence, Answer::Value(value)),
+                Ok(Reply::Value { sequence, setting, .. }) => (sequence, Answer::Value(setting)),
                 Ok(Reply::Burst { sequence, count, record, .. }) => {
                     (sequence, Answer::Burst { count, record: Box::new(record) })
                 }

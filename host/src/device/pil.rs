@@ -22,7 +22,7 @@ use crate::wire::{Answer, Firmware, Packet, Request, Sample, Turned, in_words};
 use crate::{MAX_FINGERS, MAX_JOINTS};
 use blindgrasp_shared::command::{Command, Refusal};
 use blindgrasp_shared::parameter::ParameterError;
-use blindgrasp_shared::settings::{Each, Parameter};
+use blindgrasp_shared::parameters::Parameter;
 use blindgrasp_shared::telemetry::{INTERFACE_VERSION, List};
 use blindgrasp_shared::tick::{Params, Sensed};
 
@@ -328,17 +328,12 @@ impl<P: Peer> Pilot<P> {
     /// Every parameter that is different in the peer, with what it has to be.
     fn changes(&mut self, sample: &Sample) -> Result<Vec<(Parameter, u8, f32)>, PilError> {
         let mut changes = Vec::new();
-        for &parameter in Parameter::ALL {
-            let count = match parameter.each() {
-                Each::Hand => 1,
-                Each::Joint => self.joint_count as u8,
-                Each::Axis => 3,
-            };
-            for index in 0..count {
+        for parameter in Parameter::ALL {
+            for index in 0..parameter.count(self.joint_count) {
                 let request = Request::GetParameter { parameter, index };
                 let words = self.words(&request);
                 let theirs = match self.ask(request, sample)? {
-                    Answer::Value(value) => Some(value),
+                    Answer::Value(setting) => Some(setting.value),
                     Answer::Refused(Refusal::SwitchedOff) => None,
                     Answer::Refused(refusal) => return Err(PilError::Refused { request: words, refusal }),
                     answer => {
@@ -346,14 +341,14 @@ impl<P: Peer> Pilot<P> {
                     }
                 };
                 // What only a link and a clock can hurt, a scene does not know.
-                if let Parameter::HeartbeatTime | Parameter::LateTicks = parameter {
-                    if let (Parameter::HeartbeatTime, Some(time_ms)) = (parameter, theirs) {
+                if let Parameter::HEARTBEAT_TIME | Parameter::LATE_TICKS = parameter {
+                    if let (Parameter::HEARTBEAT_TIME, Some(time_ms)) = (parameter, theirs) {
                         let ticks = time_ms as u32 * 1000 / self.params.config().period_us / HEARTBEATS;
                         self.heartbeat_ticks = Some(ticks.max(1));
                     }
                     continue;
                 }
-                match (self.params.get(parameter, index).ok(), theirs) {
+                match (self.params.get(parameter, index).ok().map(|setting| setting.value), theirs) {
                     (Some(ours), Some(theirs)) if ours.to_bits() != theirs.to_bits() => {
                         changes.push((parameter, index, ours));
                     }
@@ -432,7 +427,7 @@ impl<P: Peer> Controller for Pilot<P> {
         let mut torques_nm = [0.0; MAX_JOINTS];
         torques_nm.iter_mut().zip(&record.torques_nm).for_each(|(torque, &told)| *torque = told);
         let (angles_rad, speeds_rad_s) = self.peer.motion_rad();
-        let (force_n, mode, fault) = (record.force_n, record.mode, record.fault);
+        let (force_n, mode, fault) = (record.gains.grasp[0], record.mode, record.fault);
         Ok(Stepped { torques_nm, angles_rad, speeds_rad_s, force_n, mode, fault })
     }
 }

@@ -13,7 +13,7 @@ use crate::scene::{HandFile, HandModel};
 use crate::wire::{Answer, Firmware, Request};
 use blindgrasp_shared::command::Refusal;
 use blindgrasp_shared::link::message::{Reply, Signals};
-use blindgrasp_shared::settings::{Each, Parameter};
+use blindgrasp_shared::parameters::Parameter;
 use std::path::Path;
 use std::sync::mpsc::{self, Receiver, SyncSender};
 use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
@@ -388,16 +388,14 @@ impl Recorder {
             kept.iter().rev().try_for_each(|payload| writer.sent(device, at, payload))?;
             writer.received(device, at, &identity).map(|_| ())
         })?;
-        let joint_count = u8::try_from(firmware.joint_count).unwrap_or(u8::MAX);
-        let each = |&parameter: &Parameter| {
-            let count = match parameter.each() {
-                Each::Hand => 1,
-                Each::Joint => joint_count,
-                Each::Axis => 3,
-            };
-            (0..count).map(move |index| Setting { parameter, index, value: None })
+        let each = |parameter: Parameter| {
+            (0..parameter.count(firmware.joint_count)).map(move |index| Setting {
+                parameter,
+                index,
+                value: None,
+            })
         };
-        self.settings = Parameter::ALL.iter().flat_map(each).collect();
+        self.settings = Parameter::ALL.into_iter().flat_map(each).collect();
         self.status_due = Some(now + STATUS);
         self.asked = 0;
         self.ask_parameters(talk, now);
@@ -446,7 +444,7 @@ impl Recorder {
         match (request, answer) {
             (&Request::GetParameter { parameter, index }, Some(answer)) => {
                 match answer {
-                    Answer::Value(value) => self.set(parameter, index, Some(*value)),
+                    Answer::Value(setting) => self.set(parameter, index, Some(setting.value)),
                     Answer::Refused(Refusal::Busy) => {
                         talk.ask_aside(request.clone(), now);
                         return Ok(());

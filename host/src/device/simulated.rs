@@ -122,8 +122,14 @@ impl SimulatedHand {
             fingertip_count: model.hand.fingertip_count() as u8,
             period_us: model.config.period_us,
         };
-        let identity =
-            Identity { image, units: UNITS, clock: Clock::External, reset: ResetCause::PowerOn, crash: None };
+        let identity = Identity {
+            image,
+            units: UNITS,
+            clock: Clock::External,
+            reset: ResetCause::PowerOn,
+            crash: None,
+            changed: 0,
+        };
         Ok(Self {
             device: Device::new(params, identity),
             burst: Box::new(Burst::new()),

@@ -19,7 +19,7 @@ use blindgrasp_shared::command::{Command, Refusal};
 use blindgrasp_shared::fault::Raised;
 use blindgrasp_shared::link::message::{Reply, Signals};
 use blindgrasp_shared::link::{HearError, Listener, Receiver, encode, most_bytes};
-use blindgrasp_shared::settings::Parameter;
+use blindgrasp_shared::parameters::Parameter;
 use blindgrasp_shared::supervisor::Mode;
 use blindgrasp_shared::telemetry::INTERFACE_VERSION;
 use std::collections::VecDeque;
@@ -391,7 +391,7 @@ impl Talk {
                 return Ok(());
             }
             Reply::Answer { sequence, refused } => (sequence, refused.map_or(Answer::Done, Answer::Refused)),
-            Reply::Value { sequence, value, .. } => (sequence, Answer::Value(value)),
+            Reply::Value { sequence, setting, .. } => (sequence, Answer::Value(setting)),
             Reply::Burst { sequence, count, record, .. } => {
                 (sequence, Answer::Burst { count, record: Box::new(record) })
             }
@@ -406,10 +406,10 @@ impl Talk {
         }
         let Asked { request, asker, .. } = asked;
         let heartbeat_ms = match (&request, &answer) {
-            (Request::GetParameter { parameter: Parameter::HeartbeatTime, .. }, &Answer::Value(ms)) => {
-                Some(ms)
+            (Request::GetParameter { parameter: Parameter::HEARTBEAT_TIME, .. }, &Answer::Value(setting)) => {
+                Some(setting.value)
             }
-            (&Request::SetParameter { parameter: Parameter::HeartbeatTime, value, .. }, Answer::Done) => {
+            (&Request::SetParameter { parameter: Parameter::HEARTBEAT_TIME, value, .. }, Answer::Done) => {
                 Some(value)
             }
             _ => None,
@@ -443,7 +443,7 @@ impl Talk {
         self.session = Some(session);
         self.listener = Listener::new();
         (self.heartbeat, self.due) = (HEARTBEAT, now);
-        let heartbeat = Request::GetParameter { parameter: Parameter::HeartbeatTime, index: 0 };
+        let heartbeat = Request::GetParameter { parameter: Parameter::HEARTBEAT_TIME, index: 0 };
         // Ahead of what the user asked for meanwhile.
         self.waiting.push_front((telemetry(SELDOM), Asker::Talk));
         self.waiting.push_front((heartbeat, Asker::Talk));

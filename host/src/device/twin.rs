@@ -39,7 +39,8 @@ impl Twin {
             fingertip_count: hand.hand.fingertip_count() as u8,
             period_us: hand.config.period_us,
         };
-        let identity = Identity { image, units: UNITS, clock, reset: ResetCause::Unknown, crash: None };
+        let identity =
+            Identity { image, units: UNITS, clock, reset: ResetCause::Unknown, crash: None, changed: 0 };
         Ok(Self { device: Device::new(params, identity), burst: Box::new(Burst::new()) })
     }
 
@@ -62,7 +63,7 @@ impl Twin {
                 Some(Answer::Identity { session, firmware: Firmware::from(&identity) })
             }
             Some(Reply::Answer { refused, .. }) => Some(refused.map_or(Answer::Done, Answer::Refused)),
-            Some(Reply::Value { value, .. }) => Some(Answer::Value(value)),
+            Some(Reply::Value { setting, .. }) => Some(Answer::Value(setting)),
             Some(Reply::Burst { count, record, .. }) => {
                 Some(Answer::Burst { count, record: Box::new(record) })
             }

@@ -14,7 +14,7 @@ use crate::scene::HandModel;
 use crate::wire::{Answer, Firmware, Request};
 use blindgrasp_shared::command::{self, Command, Refusal};
 use blindgrasp_shared::link::message::Signals;
-use blindgrasp_shared::settings::Parameter;
+use blindgrasp_shared::parameters::Parameter;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::mpsc::{self, Receiver, RecvTimeoutError, Sender, TryRecvError};
@@ -319,8 +319,8 @@ impl Follower {
                     self.send(Told::Stopped(refused.is_none()));
                 }
             }
-            (&Request::GetParameter { parameter, index }, &Answer::Value(value)) => {
-                self.news(News::Setting { parameter, index, value: Some(value) });
+            (&Request::GetParameter { parameter, index }, &Answer::Value(setting)) => {
+                self.news(News::Setting { parameter, index, value: Some(setting.value) });
             }
             (
                 &Request::GetParameter { parameter, index },
@@ -359,9 +359,9 @@ impl Follower {
 /// Every tick's record, and the parameters that are shown.
 fn ask_for_everything(firmware: &Firmware, talk: &mut Talk, now: Instant) {
     talk.ask(Request::Telemetry { decimation: 1, signals: Signals::FULL }, now);
-    talk.ask(Request::GetParameter { parameter: Parameter::HeartbeatTime, index: 0 }, now);
+    talk.ask(Request::GetParameter { parameter: Parameter::HEARTBEAT_TIME, index: 0 }, now);
     for index in 0..u8::try_from(firmware.joint_count).unwrap_or(u8::MAX) {
-        talk.ask(Request::GetParameter { parameter: Parameter::TorqueLimit, index }, now);
+        talk.ask(Request::GetParameter { parameter: Parameter::TORQUE_LIMIT, index }, now);
     }
 }
 

@@ -9,9 +9,10 @@ use crate::device::transport::BAUD;
 use crate::scene::HandModel;
 use crate::wire::Record;
 use blindgrasp_shared::command::{Command, Refusal};
+use blindgrasp_shared::control::{GAIN_COUNT, GAINS, Gain};
 use blindgrasp_shared::event;
 use blindgrasp_shared::limit::Limiting;
-use blindgrasp_shared::settings::Parameter;
+use blindgrasp_shared::parameters::Parameter;
 use blindgrasp_shared::supervisor::{self, Mode, Outcome};
 use std::collections::VecDeque;
 use std::time::Duration;
@@ -143,11 +144,9 @@ pub enum Plot {
     Angles,
     /// Speeds of the joints.
     Speeds,
-    /// Force of the grasp.
-    Force,
-    /// Attitude stiffness.
-    Stiffness,
-    /// Potentials of the grasp law.
+    /// A gain, by its number in the table of gains.
+    Gain(usize),
+    /// Potentials of the laws.
     Potentials,
     /// Work of the motors and of the damping.
     Work,
@@ -159,39 +158,45 @@ pub enum Plot {
 
 impl Plot {
     /// Every plot.
-    pub const ALL: [Self; 9] = [
-        Self::Torques,
-        Self::Angles,
-        Self::Speeds,
-        Self::Force,
-        Self::Stiffness,
-        Self::Potentials,
-        Self::Work,
-        Self::Excess,
-        Self::Cycles,
-    ];
+    pub const ALL: [Self; 7 + GAIN_COUNT] = {
+        let mut all = [Self::Torques; 7 + GAIN_COUNT];
+        all[1] = Self::Angles;
+        all[2] = Self::Speeds;
+        let mut k = 0;
+        while k < GAIN_COUNT {
+            all[3 + k] = Self::Gain(k);
+            k += 1;
+        }
+        all[3 + k] = Self::Potentials;
+        all[4 + k] = Self::Work;
+        all[5 + k] = Self::Excess;
+        all[6 + k] = Self::Cycles;
+        all
+    };
 
     /// What it is, with the unit.
-    pub const fn words(self) -> &'static str {
+    pub fn words(self) -> String {
         match self {
-            Self::Torques => "torques, N m",
-            Self::Angles => "angles, rad",
-            Self::Speeds => "speeds, rad/s",
-            Self::Force => "grasping force, N",
-            Self::Stiffness => "attitude stiffness, N m",
-            Self::Potentials => "potentials of the law, J",
-            Self::Work => "work since the grasp began, J",
-            Self::Excess => "work of the last second beyond the potentials, J",
-            Self::Cycles => "cycles of a tick",
+            Self::Torques => "torques, N m".into(),
+            Self::Angles => "angles, rad".into(),
+            Self::Speeds => "speeds, rad/s".into(),
+            Self::Gain(k) => {
+                let Gain { words, unit, .. } = GAINS[k];
+                format!("{}, {unit}", words.split(';').next().unwrap_or(words))
+            }
+            Self::Potentials => "potentials of the laws, J".into(),
+            Self::Work => "work since the grasp began, J".into(),
+            Self::Excess => "work of the last second beyond the potentials, J".into(),
+            Self::Cycles => "cycles of a tick".into(),
         }
     }
 
     /// Names of the signals that are drawn together, where they are not joints'.
-    pub const fn signals(self) -> &'static [&'static str] {
+    pub fn signals(self) -> Vec<&'static str> {
         match self {
-            Self::Potentials => &["approach", "attitudes", "integral"],
-            Self::Work => &["motors", "damping"],
-            _ => &[],
+            Self::Potentials => GAINS.iter().map(|gain| gain.potential.key).collect(),
+            Self::Work => vec!["motors", "damping"],
+            _ => Vec::new(),
         }
     }
 
@@ -201,14 +206,12 @@ impl Plot {
     }
 }
 
-/// Signals of the history that are not of joints, in their order; those of the joints follow, plot by plot.
-const FORCE: usize = 0;
-const STIFFNESS: usize = 1;
-const POTENTIALS: [usize; 3] = [2, 3, 4];
-const WORK: [usize; 2] = [5, 6];
-const EXCESS: usize = 7;
-const CYCLES: usize = 8;
-const SCALARS: usize = 9;
+// Signals of the history that are not of joints, in their order: gains, potentials, and these; those of the joints follow,
+// plot by plot.
+const WORK: [usize; 2] = [2 * GAIN_COUNT, 2 * GAIN_COUNT + 1];
+const EXCESS: usize = 2 * GAIN_COUNT + 2;
+const CYCLES: usize = 2 * GAIN_COUNT + 3;
+const SCALARS: usize = 2 * GAIN_COUNT + 4;
 
 /// What is known of a hand.
 #[derive(Clone, Debug)]
@@ -315,8 +318,8 @@ impl Model {
 
     fn set(&mut self, parameter: Parameter, index: u8, value: Option<f32>) {
         match parameter {
-            Parameter::HeartbeatTime => self.heartbeat_ms = value,
-            Parameter::TorqueLimit => {
+            Parameter::HEARTBEAT_TIME => self.heartbeat_ms = value,
+            Parameter::TORQUE_LIMIT => {
                 if let Some(limit) = self.torque_limits_nm.get_mut(usize::from(index)) {
                     *limit = value;
                 }
@@ -362,24 +365,15 @@ impl Model {
     /// Adds what is known now to the history.
     fn remember(&mut self, at: Duration) {
         let Some((_, record)) = &self.record else { return };
-        let scalars: [f32; SCALARS] = [
-            record.force_n,
-            record.attitude_stiffness_nm,
-            record.approach_potential_j,
-            record.attitude_potential_j,
-            record.integral_potential_j,
-            record.work_j,
-            record.damped_j,
-            record.excess_j,
-            record.cycles as f32,
-        ];
+        let others = [record.work_j, record.damped_j, record.excess_j, record.cycles as f32];
+        let scalars = record.gains.iter().chain(record.potentials_j.iter()).copied().chain(others);
         let joints: Vec<Joint<'_>> = self.joints().collect();
         let unknown = |value: Option<f32>| value.unwrap_or(f32::NAN);
         let torques = joints.iter().map(|joint| unknown(joint.torque_nm));
         let angles =
             joints.iter().map(|joint| unknown(joint.angle_rad.or(joint.count.map(|count| count as f32))));
         let speeds = joints.iter().map(|joint| unknown(joint.speed));
-        let values: Vec<f32> = scalars.into_iter().chain(torques).chain(angles).chain(speeds).collect();
+        let values: Vec<f32> = scalars.chain(torques).chain(angles).chain(speeds).collect();
         self.history.add(at, values.into_iter());
     }
 
@@ -550,9 +544,8 @@ impl Model {
             Plot::Torques => of_joints(0),
             Plot::Angles => of_joints(1),
             Plot::Speeds => of_joints(2),
-            Plot::Force => vec![FORCE],
-            Plot::Stiffness => vec![STIFFNESS],
-            Plot::Potentials => POTENTIALS.to_vec(),
+            Plot::Gain(k) => vec![k],
+            Plot::Potentials => (GAIN_COUNT..2 * GAIN_COUNT).collect(),
             Plot::Work => WORK.to_vec(),
             Plot::Excess => vec![EXCESS],
             Plot::Cycles => vec![CYCLES],
@@ -644,7 +637,7 @@ pub(super) mod tests {
         assert_eq!(model.heartbeat_left_ms(ms(10)), None);
         model.take(
             ms(10),
-            News::Setting { parameter: Parameter::HeartbeatTime, index: 0, value: Some(250.0) },
+            News::Setting { parameter: Parameter::HEARTBEAT_TIME, index: 0, value: Some(250.0) },
         );
         assert_eq!(model.heartbeat_left_ms(ms(10)), None);
         model.take(ms(20), News::Heartbeat);

@@ -327,7 +327,7 @@ mod tests {
             period_us: 1000,
         };
         let (clock, reset) = (Clock::External, ResetCause::PowerOn);
-        let about = About::of(&Identity { image, units: UNITS, clock, reset, crash: None });
+        let about = About::of(&Identity { image, units: UNITS, clock, reset, crash: None, changed: 0 });
         let mut writer = Writer::create(&path, false).expect("a file");
         let devices = [writer.add_device("hand1"), writer.add_device("hand2")];
         let at = |ms: u32| Stamp(BEGUN + u64::from(ms) * 1_000_000);

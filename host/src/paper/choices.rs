@@ -160,7 +160,7 @@ fn taken_by_equation_46(done: &Done) -> f64 {
         |sample: &Sample| sample.contacts.iter().map(|contact| contact.indentation_m).sum::<f64>();
     let samples = &done.run.samples;
     let change = samples.last().zip(samples.first()).map_or(0.0, |(a, b)| indentations(a) - indentations(b));
-    (done.scene.control.force_n * change).abs()
+    (done.scene.control.force_n() * change).abs()
 }
 
 fn largest_torque(done: &Done) -> f64 {

@@ -235,8 +235,8 @@ pub fn gains(scene: &Scene) -> String {
     let friction = scene.joints.iter().fold(0.0_f64, |most, joint| most.max(joint.friction.coulomb_nm));
     let mut words = format!(
         "f_d = {} N, K_st = {} N m, C from {least} to {most} N m s/rad; law every {} ms",
-        control.force_n,
-        control.attitude_stiffness_nm,
+        control.force_n(),
+        control.attitude_stiffness_nm(),
         1e3 * control.period_s
     );
     match scene.actuators.output_delay_ticks {

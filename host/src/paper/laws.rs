@@ -37,10 +37,10 @@ impl Law {
 
     /// Makes it the law of a controller.
     pub fn set(self, control: &mut Control, gain: f64) {
-        (control.attitude_stiffness_nm, control.integral_gain_nm_rad) = match self {
-            Self::NormalOnly => (0.0, 0.0),
-            Self::Attitudes => (gain, 0.0),
-            Self::Integral => (0.0, gain),
+        (control.gains.grasp[1], control.gains.integral) = match self {
+            Self::NormalOnly => (0.0, [0.0]),
+            Self::Attitudes => (gain, [0.0]),
+            Self::Integral => (0.0, [gain]),
         };
     }
 }

@@ -115,13 +115,13 @@ impl Quality {
             &inwards,
             &radii,
             &stiffnesses,
-            scene.control.force_n,
+            scene.control.force_n(),
         )
         .ok()?;
         let rolling_radii: Vec<f64> = radii.iter().zip(&indentations).map(|(r, dr)| r - dr).collect();
         let gains = Gains {
-            approach_n_m: scene.control.force_n / radii.iter().sum::<f64>(),
-            attitude_nm: scene.control.attitude_stiffness_nm,
+            approach_n_m: scene.control.force_n() / radii.iter().sum::<f64>(),
+            attitude_nm: scene.control.attitude_stiffness_nm(),
         };
         let rolling = Rolling::new(&facets, &rolling_radii, gains);
         let mut z = Coordinates::zeros();

@@ -180,7 +180,7 @@ fn stance(
         Indentation::Metres(indentation) => vec![indentation; task.count],
         Indentation::Equilibrium => {
             let stiffnesses: Vec<f64> = hand.fingertips.iter().map(|tip| tip.stiffness_n_m2).collect();
-            let force_n = task.request.like.control.force_n;
+            let force_n = task.request.like.control.force_n();
             equilibrium_indentations(&points, &inwards, &radii, &stiffnesses, force_n).ok()?
         }
     };

@@ -68,8 +68,8 @@ impl<'a> Task<'a> {
 
         let control = &request.like.control;
         let gains = Gains {
-            approach_n_m: control.force_n / radii.iter().sum::<f64>(),
-            attitude_nm: control.attitude_stiffness_nm,
+            approach_n_m: control.force_n() / radii.iter().sum::<f64>(),
+            attitude_nm: control.attitude_stiffness_nm(),
         };
         // Eq. 57 for a fingertip that stands as far from the centroid as the object's faces do from its centre of mass.
         let distance =

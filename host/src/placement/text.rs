@@ -2,6 +2,7 @@
 
 use super::Placement;
 use crate::scene::file::{Indentation, SceneFile};
+use blindgrasp_shared::control::GAINS;
 use std::fmt::Write as _;
 
 /// The scene as a file: reading it gives the placement's scene again. `hand` and `object` are built-in names, or paths
@@ -111,8 +112,8 @@ fn settings(text: &mut String, file: &SceneFile) {
         text,
         "\n[control]\nforce_n = {:?}                 # f_d\nattitude_stiffness_nm = {:?}   # K_st\ndamping_scale = {:?}\n\
          gravity_compensation = {}\nperiod_s = {:?}\nsoft_start_s = {:?}\nestimator_bandwidth_hz = {:?}\nend_stops = {}\n",
-        control.force_n,
-        control.attitude_stiffness_nm,
+        control.force_n(),
+        control.attitude_stiffness_nm(),
         control.damping_scale,
         control.gravity_compensation,
         control.period_s,
@@ -120,12 +121,10 @@ fn settings(text: &mut String, file: &SceneFile) {
         control.estimator_bandwidth_hz,
         control.end_stops,
     );
-    if control.integral_gain_nm_rad != 0.0 {
-        let _ = writeln!(
-            text,
-            "integral_gain_nm_rad = {:?}    # K_I of the earlier law",
-            control.integral_gain_nm_rad
-        );
+    for (gain, value) in GAINS.iter().zip(control.gains.iter()).skip(control.gains.grasp.len()) {
+        if *value != 0.0 {
+            let _ = writeln!(text, "{} = {value:?}    # {}", gain.key, gain.words);
+        }
     }
     let _ = write!(
         text,

@@ -1,6 +1,7 @@
 //! What two devices that were told the same did, bit for bit.
 
 use crate::wire::{Answer, Record, Turned};
+use blindgrasp_shared::signals::Value as Told;
 use serde::Serialize;
 use std::fmt;
 
@@ -97,31 +98,36 @@ impl Comparison {
             return true;
         }
         let before = self.bits_differ;
-        self.torques(tick, device, host);
-        for ((what, device), (_, host)) in words(device).into_iter().zip(words(host)) {
-            if device != host {
-                self.differs(tick, what, None, Value::Words(device), Value::Words(host));
-            }
-        }
-        for ((what, device), (_, host)) in numbers(device).into_iter().zip(numbers(host)) {
-            if device.to_bits() != host.to_bits() {
-                self.differs(tick, what, None, Value::of(device), Value::of(host));
-            }
-        }
+        let mut told = Vec::new();
+        device.tell(|signal| told.push(signal));
+        let mut told = told.into_iter();
+        host.tell(|host| {
+            let Some(device) = told.next() else { return };
+            self.signal(tick, host.signal.key, &device.value, &host.value);
+        });
         self.bits_differ == before
     }
 
-    fn torques(&mut self, tick: i64, device: &Record, host: &Record) {
-        let (device, host) = (device.torques_nm.as_slice(), host.torques_nm.as_slice());
-        if device.len() != host.len() {
-            let [device, host] = [device, host].map(|torques| Value::Words(torques.len().to_string()));
-            self.differs(tick, "number of torques", None, device, host);
-            return;
-        }
-        for (k, (&device, &host)) in device.iter().zip(host).enumerate() {
-            if device.to_bits() != host.to_bits() {
-                self.differs(tick, "torque, N m,", Some(k), Value::of(device), Value::of(host));
+    /// Compares two values; floats by their bits.
+    fn signal(&mut self, tick: i64, what: &'static str, device: &Told<'_>, host: &Told<'_>) {
+        match (device, host) {
+            (Told::Real(device), Told::Real(host)) => self.reals(tick, what, None, *device, *host),
+            (Told::Reals(device), Told::Reals(host)) if device.len() == host.len() => {
+                for (k, (&device, &host)) in device.iter().zip(*host).enumerate() {
+                    self.reals(tick, what, Some(k), device, host);
+                }
             }
+            _ if device == host => {}
+            _ => {
+                let [device, host] = [device, host].map(|value| Value::Words(value.to_string()));
+                self.differs(tick, what, None, device, host);
+            }
+        }
+    }
+
+    fn reals(&mut self, tick: i64, what: &'static str, joint: Option<usize>, device: f32, host: f32) {
+        if device.to_bits() != host.to_bits() {
+            self.differs(tick, what, joint, Value::of(device), Value::of(host));
         }
     }
 
@@ -142,62 +148,19 @@ impl Comparison {
     }
 }
 
-/// Whether two records are the same, where a float is its bits.
+/// Whether two records are the same, where a float is its bits: on the wire it is nothing else.
 fn same_bits(a: &Record, b: &Record) -> bool {
-    let whole = |r: &Record| (r.sequence, r.tick, r.mode, r.fault, r.events, r.reading_failed);
-    let counters = |r: &Record| (r.cycles, r.late_ticks, r.dropped, r.decimation);
-    let same =
-        |a: &[f32], b: &[f32]| a.len() == b.len() && a.iter().zip(b).all(|(a, b)| a.to_bits() == b.to_bits());
-    whole(a) == whole(b)
-        && counters(a) == counters(b)
-        && a.answer == b.answer
-        && same(&numbers(a).map(|(_, number)| number), &numbers(b).map(|(_, number)| number))
-        && a.counts == b.counts
-        && same(a.torques_nm.as_slice(), b.torques_nm.as_slice())
-        && a.limiting == b.limiting
+    let [mut first, mut second] = [[0; Record::MOST_BYTES]; 2];
+    a.encode(&mut first).ok().as_deref() == b.encode(&mut second).ok().as_deref()
 }
 
 /// Who each is, is not compared, only in which session they are.
 fn same_answer(a: Option<&Answer>, b: Option<&Answer>) -> bool {
     match (a, b) {
-        (Some(Answer::Value(a)), Some(Answer::Value(b))) => a.to_bits() == b.to_bits(),
+        (Some(Answer::Value(a)), Some(Answer::Value(b))) => a.value.to_bits() == b.value.to_bits(),
         (Some(Answer::Identity { session: a, .. }), Some(Answer::Identity { session: b, .. })) => a == b,
         (a, b) => a == b,
     }
-}
-
-/// What of a record is not a real number.
-fn words(record: &Record) -> [(&'static str, String); 13] {
-    [
-        ("mode", record.mode.words().to_owned()),
-        ("fault", record.fault.map_or("none".to_owned(), |raised| raised.to_string())),
-        ("answer to the command", record.answer.map_or("none".to_owned(), |answer| answer.to_string())),
-        ("events", record.events.to_string()),
-        ("reading", record.reading_failed.map_or("good".to_owned(), |raised| raised.to_string())),
-        ("tick", record.tick.to_string()),
-        ("sequence", record.sequence.to_string()),
-        ("cycles", record.cycles.to_string()),
-        ("late ticks", record.late_ticks.to_string()),
-        ("dropped", record.dropped.to_string()),
-        ("decimation", record.decimation.to_string()),
-        ("counts", format!("{:?}", record.counts)),
-        ("limiting", format!("{:?}", record.limiting)),
-    ]
-}
-
-/// What of a record is a real number, but for the torques.
-fn numbers(record: &Record) -> [(&'static str, f32); 9] {
-    [
-        ("force, N,", record.force_n),
-        ("attitude stiffness, N m,", record.attitude_stiffness_nm),
-        ("integral gain, N m/rad,", record.integral_gain_nm_rad),
-        ("approach potential, J,", record.approach_potential_j),
-        ("attitude potential, J,", record.attitude_potential_j),
-        ("integral potential, J,", record.integral_potential_j),
-        ("work, J,", record.work_j),
-        ("damped, J,", record.damped_j),
-        ("excess, J,", record.excess_j),
-    ]
 }
 
 #[cfg(test)]
@@ -238,7 +201,7 @@ mod tests {
         let difference = comparison.first_difference.unwrap();
         assert_eq!(
             difference.to_string(),
-            "tick 7: torque, N m, of joint `b`: firmware 1e0 (0x3f800000), host 1.0000001e0 (0x3f800001)"
+            "tick 7: torque_nm of joint `b`: firmware 1e0 (0x3f800000), host 1.0000001e0 (0x3f800001)"
         );
         let json = serde_json::to_value(&difference).unwrap();
         assert_eq!(json["joint"], "b");
@@ -263,17 +226,17 @@ mod tests {
         let changes: [(&str, Change); 11] = [
             ("mode", |t| t.record.mode = Mode::Fault),
             ("fault", |t| t.record.fault = Some(Raised::of_hand(Fault::LinkLost))),
-            ("answer to the command", |t| {
+            ("answer", |t| {
                 t.record.answer =
                     Some(blindgrasp_shared::command::Answer { command: Command::Arm, refused: None });
             }),
-            ("reading", |t| t.record.reading_failed = Some(Raised::at(1, Fault::SampleMissing))),
+            ("reading_failed", |t| t.record.reading_failed = Some(Raised::at(1, Fault::SampleMissing))),
             ("tick", |t| t.record.tick += 1),
             ("decimation", |t| t.record.decimation = 2),
             ("sequence", |t| t.record.sequence += 1),
-            ("counts", |t| t.record.counts = List::first_of([1; crate::MAX_JOINTS], 3)),
-            ("number of torques", |t| t.record.torques_nm = List::default()),
-            ("excess, J,", |t| t.record.excess_j = 1e-30),
+            ("count", |t| t.record.counts = List::first_of([1; crate::MAX_JOINTS], 3)),
+            ("torque_nm", |t| t.record.torques_nm = List::default()),
+            ("excess_j", |t| t.record.excess_j = 1e-30),
             ("answer to the request", |t| t.answer = Some(Answer::Refused(Refusal::Busy))),
         ];
         for (what, change) in changes {

@@ -3,6 +3,7 @@
 #[cfg(feature = "command")]
 pub mod compare;
 pub mod csv;
+pub mod derived;
 #[cfg(feature = "command")]
 pub mod export;
 #[cfg(feature = "command")]

@@ -8,6 +8,7 @@ use super::{
     object::object,
     start::start,
 };
+use blindgrasp_shared::control::{GAINS, Ramp};
 use nalgebra::Vector3;
 
 /// Longer runs are likely mistakes, s.
@@ -153,9 +154,10 @@ pub(super) fn control(control: &Control) -> Result<()> {
             format!("{:?} is", microseconds.round() * 1e-6),
         );
     }
-    within("control.force_n", control.force_n, 1e-6, 1e4)?;
-    within("control.attitude_stiffness_nm", control.attitude_stiffness_nm, 0.0, 1e4)?;
-    within("control.integral_gain_nm_rad", control.integral_gain_nm_rad, 0.0, 1e4)?;
+    for (gain, &value) in GAINS.iter().zip(control.gains.iter()) {
+        let least = if gain.ramp == Ramp::Force { 1e-6 } else { 0.0 };
+        within(&format!("control.{}", gain.key), value, least, 1e4)?;
+    }
     within("control.damping_scale", control.damping_scale, 0.0, 1e4)?;
     within("control.soft_start_s", control.soft_start_s, 0.0, LONGEST_RUN_S)?;
     // The tick's own bounds, so that the file and the key are named here.

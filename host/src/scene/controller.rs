@@ -2,10 +2,10 @@
 
 use super::file::{Actuators, Control, JointFile, Sensors};
 use crate::MAX_JOINTS;
-use blindgrasp_shared::control::GraspConfig;
+use blindgrasp_shared::control::{Hold, LawsConfig};
 use blindgrasp_shared::estimate::{Encoder, EstimatorConfig};
-use blindgrasp_shared::fault::{FaultConfig, FrozenConfig};
-use blindgrasp_shared::limit::{LimitConfig, StopConfig};
+use blindgrasp_shared::fault::FaultConfig;
+use blindgrasp_shared::limit::LimitConfig;
 use blindgrasp_shared::math::Real;
 use blindgrasp_shared::supervisor::SupervisorConfig;
 use blindgrasp_shared::tick::Config;
@@ -55,27 +55,23 @@ pub(super) struct Setup<'a> {
 }
 
 impl Setup<'_> {
-    /// Gains of the law, in either precision.
-    pub(super) fn law<T: Real>(&self) -> GraspConfig<T, MAX_JOINTS> {
+    /// The laws, in either precision.
+    pub(super) fn laws<T: Real>(&self) -> LawsConfig<T, MAX_JOINTS> {
         let gravity = || Vector3::from(self.gravity_m_s2).map(T::from_f64);
-        GraspConfig {
-            force_n: T::from_f64(self.control.force_n),
-            attitude_stiffness_nm: T::from_f64(self.control.attitude_stiffness_nm),
-            integral_gain_nm_rad: T::from_f64(self.control.integral_gain_nm_rad),
-            damping_nm_s: self.each(|joint| self.damping_nm_s(joint)),
-            gravity_m_s2: self.control.gravity_compensation.then(gravity),
+        LawsConfig {
+            gains: self.control.gains.map(|&gain| T::from_f64(gain)),
+            chosen: self.control.laws,
+            hold: Hold {
+                damping_nm_s: self.each(|joint| self.damping_nm_s(joint)),
+                gravity_m_s2: self.control.gravity_compensation.then(gravity),
+            },
         }
     }
 
     /// Everything that the tick needs.
     pub(super) fn config(&self) -> Config<MAX_JOINTS> {
         let &Self { control, sensors, actuators, .. } = self;
-        let stops = control.end_stops.then(|| StopConfig {
-            margin_rad: self.each(stop_margin_rad),
-            stiffness_nm_rad: self.each(|joint| STOP_SHARE * joint.torque_limit_nm / stop_margin_rad(joint)),
-            damping_nm_s: self.each(|joint| 10.0 * self.damping_nm_s(joint)),
-        });
-        let (watched, limited) = (!sensors.ideal, actuators.torque_limits);
+        let (watched, limited, stops) = (!sensors.ideal, actuators.torque_limits, control.end_stops);
         Config {
             period_us: (control.period_s * 1e6).round() as u32,
             estimator: EstimatorConfig {
@@ -88,11 +84,9 @@ impl Setup<'_> {
                     })
                 }),
             },
-            law: self.law(),
+            laws: self.laws(),
             limits: LimitConfig {
-                force_n: limited.then_some((FIRMEST * control.force_n) as f32),
-                attitude_stiffness_nm: limited.then_some((FIRMEST * control.attitude_stiffness_nm) as f32),
-                integral_gain_nm_rad: limited.then_some((FIRMEST * control.integral_gain_nm_rad) as f32),
+                gains: control.gains.map(|gain| limited.then_some((FIRMEST * gain) as f32)),
                 torque_nm: limited.then(|| self.each(|joint| joint.torque_limit_nm)),
                 slew_nm_s: match actuators.slew_limit_nm_s {
                     Some(limit) => Some(self.each(|_| limit)),
@@ -101,7 +95,10 @@ impl Setup<'_> {
                     }
                     None => None,
                 },
-                stops,
+                stop_margin_rad: stops.then(|| self.each(stop_margin_rad)),
+                stop_stiffness_nm_rad: stops
+                    .then(|| self.each(|joint| STOP_SHARE * joint.torque_limit_nm / stop_margin_rad(joint))),
+                stop_damping_nm_s: stops.then(|| self.each(|joint| 10.0 * self.damping_nm_s(joint))),
             },
             faults: FaultConfig {
                 possible_speed_rad_s: watched
@@ -109,11 +106,10 @@ impl Setup<'_> {
                 speed_limit_rad_s: watched.then(|| self.each(|joint| joint.speed_limit_rad_s)),
                 range_slack_rad: control.end_stops.then_some(RANGE_SLACK_RAD as f32),
                 saturated_ms: limited.then_some(SATURATED_MS),
-                frozen: (watched && limited).then(|| FrozenConfig {
-                    torque_nm: self.each(|joint| FROZEN_SHARE * joint.torque_limit_nm),
-                    neighbour_rad: FROZEN_NEIGHBOUR_RAD as f32,
-                    after_ms: FROZEN_MS,
-                }),
+                frozen_torque_nm: (watched && limited)
+                    .then(|| self.each(|joint| FROZEN_SHARE * joint.torque_limit_nm)),
+                frozen_neighbour_rad: (watched && limited).then_some(FROZEN_NEIGHBOUR_RAD as f32),
+                frozen_ms: (watched && limited).then_some(FROZEN_MS),
                 heartbeat_ms: None,
                 late_ticks: None,
                 energy_j: limited.then(|| {

@@ -3,9 +3,11 @@
 //! These structs are the effective configuration: what stays after references are followed, defaults filled in and
 //! `--set` applied. Tests build them in code and hand them to [`Scene::build`](super::Scene::build).
 
+mod control;
 mod object;
 mod push;
 
+pub use control::Control;
 pub use object::{ObjectFile, ShapeFile};
 pub use push::PushFile;
 
@@ -149,48 +151,6 @@ impl<'de> Deserialize<'de> for Indentation {
             }
         }
         deserializer.deserialize_any(Visitor)
-    }
-}
-
-/// The controller: Eqs. 29-34, the law before them, and what surrounds them. The damping gains are the hand's.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Control {
-    /// Nominal grasping force `f_d` of Eq. 30, N. The fingertips' force follows from it by Eq. 57.
-    pub force_n: f64,
-    /// Stiffness `K_st` of the relative attitude constraint of Eq. 32, N m; 0 for the normal forces alone.
-    pub attitude_stiffness_nm: f64,
-    /// Gain `K_I` of the earlier law's integral of each joint's velocity, N m/rad. With `attitude_stiffness_nm = 0` that law
-    /// takes the place of Eq. 32's.
-    #[serde(default)]
-    pub integral_gain_nm_rad: f64,
-    /// Factor on the damping gains of the hand's joints.
-    #[serde(default = "one")]
-    pub damping_scale: f64,
-    /// Whether the term `g` of Eq. 30 holds the weight of the links.
-    #[serde(default = "yes")]
-    pub gravity_compensation: bool,
-    /// Sampling period, s.
-    #[serde(default = "Control::period_s")]
-    pub period_s: f64,
-    /// Time over which `f_d` rises from zero, s.
-    #[serde(default)]
-    pub soft_start_s: f64,
-    /// Bandwidth of the estimate of joint angles and speeds from the encoder counts, Hz. Ideal sensors need no estimate.
-    #[serde(default = "Control::estimator_bandwidth_hz")]
-    pub estimator_bandwidth_hz: f64,
-    /// Whether soft end stops keep the joints within their limits.
-    #[serde(default = "yes")]
-    pub end_stops: bool,
-}
-
-impl Control {
-    fn period_s() -> f64 {
-        1e-3
-    }
-
-    fn estimator_bandwidth_hz() -> f64 {
-        50.0
     }
 }
 

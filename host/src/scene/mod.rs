@@ -33,7 +33,7 @@ use crate::plant::contact::{FaceContact, FingertipModel};
 use crate::plant::friction::JointFriction;
 use crate::plant::polyhedron::Polyhedron;
 use crate::{Hand, MAX_JOINTS};
-use blindgrasp_shared::control::GraspConfig;
+use blindgrasp_shared::control::LawsConfig;
 use blindgrasp_shared::math::Real;
 use blindgrasp_shared::tick::Config;
 use controller::Setup;
@@ -204,9 +204,9 @@ impl Scene {
         self.setup().config()
     }
 
-    /// The gains of the grasp law, in either precision.
-    pub fn law_config<T: Real>(&self) -> GraspConfig<T, MAX_JOINTS> {
-        self.setup().law()
+    /// The control laws and their gains, in either precision.
+    pub fn laws_config<T: Real>(&self) -> LawsConfig<T, MAX_JOINTS> {
+        self.setup().laws()
     }
 
     fn setup(&self) -> Setup<'_> {

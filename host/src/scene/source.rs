@@ -2,22 +2,22 @@
 //!
 //! Arrays of joints are written in the hand's exact size. Floats are written with the digits that give back every bit.
 
-use blindgrasp_shared::control::GraspConfig;
+use blindgrasp_shared::control::{Chosen, Hold, LawsConfig, PerGain};
 use blindgrasp_shared::estimate::{Encoder, EstimatorConfig};
-use blindgrasp_shared::fault::{FaultConfig, FrozenConfig};
+use blindgrasp_shared::fault::FaultConfig;
 use blindgrasp_shared::hand::{Bend, Fingertip, Link, PreparedJoint};
-use blindgrasp_shared::limit::{LimitConfig, StopConfig};
+use blindgrasp_shared::limit::LimitConfig;
 use blindgrasp_shared::supervisor::SupervisorConfig;
 use blindgrasp_shared::tick::Config;
 use nalgebra::{Matrix3, Vector3};
 
 /// What every file of constants begins with.
 pub(super) const IMPORTS: &str = "\
-use blindgrasp_shared::control::GraspConfig;
+use blindgrasp_shared::control::{Chosen, Hold, LawsConfig, PerGain};
 use blindgrasp_shared::estimate::{Encoder, EstimatorConfig};
-use blindgrasp_shared::fault::{FaultConfig, FrozenConfig};
+use blindgrasp_shared::fault::FaultConfig;
 use blindgrasp_shared::hand::{Bend, Fingertip, Hand, Link, PreparedJoint};
-use blindgrasp_shared::limit::{LimitConfig, StopConfig};
+use blindgrasp_shared::limit::LimitConfig;
 use blindgrasp_shared::supervisor::SupervisorConfig;
 use blindgrasp_shared::tick::Config;
 use nalgebra::{Matrix3, Vector3};
@@ -92,6 +92,21 @@ fn list<V: Source>(values: &[V], joints: usize) -> String {
     values.iter().map(|value| value.source(joints)).collect::<Vec<_>>().join(", ")
 }
 
+impl<V: Source> Source for PerGain<V> {
+    fn source(&self, _: usize) -> String {
+        let gains = self.iter().map(|gain| gain.source(0)).collect::<Vec<_>>().join(", ");
+        format!("PerGain::of([{gains}])")
+    }
+}
+
+impl Source for Chosen {
+    fn source(&self, _: usize) -> String {
+        (0..8)
+            .filter(|&law| self.has(law))
+            .fold("Chosen::NONE".into(), |text, law| format!("{text}.with({law}, true)"))
+    }
+}
+
 /// Structs by their fields. A field that is missing here does not compile.
 macro_rules! structs {
     ($(impl [$($size:tt)*] $type:ty as $name:ident { $($field:ident)* })*) => {$(
@@ -114,19 +129,17 @@ structs! {
     }
     impl [] Encoder as Encoder { zero_count rad_per_count reversed }
     impl [const J: usize] EstimatorConfig<J> as EstimatorConfig { bandwidth_hz encoders }
-    impl [const J: usize] GraspConfig<f32, J> as GraspConfig {
-        force_n attitude_stiffness_nm integral_gain_nm_rad damping_nm_s gravity_m_s2
-    }
-    impl [const J: usize] StopConfig<J> as StopConfig { margin_rad stiffness_nm_rad damping_nm_s }
+    impl [const J: usize] Hold<f32, J> as Hold { damping_nm_s gravity_m_s2 }
+    impl [const J: usize] LawsConfig<f32, J> as LawsConfig { gains chosen hold }
     impl [const J: usize] LimitConfig<J> as LimitConfig {
-        force_n attitude_stiffness_nm integral_gain_nm_rad torque_nm slew_nm_s stops
+        gains torque_nm slew_nm_s stop_margin_rad stop_stiffness_nm_rad stop_damping_nm_s
     }
-    impl [const J: usize] FrozenConfig<J> as FrozenConfig { torque_nm neighbour_rad after_ms }
     impl [const J: usize] FaultConfig<J> as FaultConfig {
-        possible_speed_rad_s speed_limit_rad_s range_slack_rad saturated_ms frozen heartbeat_ms late_ticks energy_j
+        possible_speed_rad_s speed_limit_rad_s range_slack_rad saturated_ms frozen_torque_nm frozen_neighbour_rad
+        frozen_ms heartbeat_ms late_ticks energy_j
     }
     impl [] SupervisorConfig as SupervisorConfig { soft_start_ms release_ms }
-    impl [const J: usize] Config<J> as Config { period_us estimator law limits faults supervisor }
+    impl [const J: usize] Config<J> as Config { period_us estimator laws limits faults supervisor }
 }
 
 #[cfg(test)]

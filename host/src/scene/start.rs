@@ -120,8 +120,8 @@ pub(super) fn start(
         Indentation::Equilibrium => {
             let stiffnesses: Vec<f64> =
                 file.hand.fingertips.iter().map(|fingertip| fingertip.stiffness_n_m2).collect();
-            equilibrium_indentations(&points, &inwards, &radii, &stiffnesses, file.control.force_n).or_else(
-                |i| {
+            equilibrium_indentations(&points, &inwards, &radii, &stiffnesses, file.control.force_n())
+                .or_else(|i| {
                     fail(
                         format!("contact.{}", i + 1),
                         format!(
@@ -130,8 +130,7 @@ pub(super) fn start(
                         ),
                         "choose faces that look away from the middle of the fingertips",
                     )
-                },
-            )?
+                })?
         }
     };
     for (i, &indentation) in indentations_m.iter().enumerate() {

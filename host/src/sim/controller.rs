@@ -112,7 +112,7 @@ impl Controller for Alone {
             torques_nm: output.torques_nm,
             angles_rad: *self.state.angles_rad(),
             speeds_rad_s: *self.state.speeds_rad_s(),
-            force_n: output.record.force_n,
+            force_n: output.record.gains.grasp[0],
             mode: output.record.mode,
             fault: output.record.fault,
         };

@@ -28,7 +28,7 @@ use crate::record::sample::Sample;
 use crate::scene::Scene;
 use crate::scene::file::PushFile;
 use blindgrasp_shared::command::{Command, Grasp};
-use blindgrasp_shared::control::GraspLaw;
+use blindgrasp_shared::control::Laws;
 use blindgrasp_shared::fault::Raised;
 use blindgrasp_shared::parameter::ParameterError;
 use blindgrasp_shared::tick::Sensed;
@@ -142,11 +142,11 @@ impl<C: Controller> Simulation<C> {
             sample_ticks: 1,
             motors: Motors::new(scene),
             delay_ticks: scene.actuators.output_delay_ticks,
-            force_n: scene.controller_config().law.force_n,
+            force_n: scene.control.force_n() as f32,
             ideal: scene.sensors.ideal,
             encoders: Encoders::new(scene),
             injections: Injections::default(),
-            observer: Observer::new(law(scene)?, &plant),
+            observer: Observer::new(laws(scene)?, &plant),
             controller,
             plant,
         })
@@ -314,12 +314,12 @@ pub fn plant(scene: &Scene) -> Result<Plant, ModelError> {
     Plant::new(model(scene), start, scene.plant.substep_s)
 }
 
-/// The grasp law of a scene in the precision of the plant.
+/// The control laws of a scene in the precision of the plant.
 ///
 /// # Errors
 /// A gain that is out of its range.
-pub fn law(scene: &Scene) -> Result<GraspLaw<f64, MAX_JOINTS>, ParameterError> {
-    scene.law_config().prepare(&scene.hand)
+pub fn laws(scene: &Scene) -> Result<Laws<f64, MAX_JOINTS>, ParameterError> {
+    scene.laws_config().prepare(&scene.hand)
 }
 
 /// The plant of a scene.

@@ -9,13 +9,13 @@
 use crate::plant::{Motion, Plant};
 use crate::record::sample::{ContactSample, EnergySample, Sample};
 use crate::{Hand, MAX_FINGERS, MAX_JOINTS};
-use blindgrasp_shared::control::{GraspLaw, Latch};
+use blindgrasp_shared::control::{Latch, Laws, Stance};
 use nalgebra::Vector3;
 
 /// The law as it would be with perfect sensors, in the precision of the plant: what the run is compared with.
 #[derive(Clone, Debug)]
 pub struct Observer {
-    law: GraspLaw<f64, MAX_JOINTS>,
+    laws: Laws<f64, MAX_JOINTS>,
     latch: Latch<f64, MAX_JOINTS, MAX_FINGERS>,
 }
 
@@ -35,27 +35,29 @@ pub struct Seen<'a> {
 }
 
 impl Observer {
-    /// Observes a law whose latch closes where a plant is.
-    pub fn new(law: GraspLaw<f64, MAX_JOINTS>, start: &Plant) -> Self {
-        Self { law, latch: Latch::of(start.posture(), &start.motion().angles_rad) }
+    /// Observes laws whose latch closes where a plant is.
+    pub fn new(laws: Laws<f64, MAX_JOINTS>, start: &Plant) -> Self {
+        Self { laws, latch: Latch::of(start.posture(), &start.motion().angles_rad) }
     }
 
     /// Energy at this instant, after the velocities were solved for. The potentials are those of the whole law, also while
     /// its force is still growing.
     pub fn energies(&self, plant: &Plant) -> EnergySample {
-        let grip = self.law.grip(&self.latch);
+        let grip = self.laws.grip(&self.latch);
         let Motion { angles_rad, speeds_rad_s, .. } = plant.motion();
-        let (_, monitor) =
-            self.law.torques(&plant.model().hand, plant.posture(), angles_rad, speeds_rad_s, Some(grip));
+        let stance = Stance { hand: &plant.model().hand, posture: plant.posture(), angles_rad };
+        let (_, account) = self.laws.torques(&stance, speeds_rad_s, Some(&grip));
+        let [approach_j, attitude_j] = account.potentials_j.grasp;
+        let [integral_j] = account.potentials_j.integral;
         let flows = plant.flows();
-        let gains = self.law.damping_nm_s().iter();
+        let gains = self.laws.config().hold.damping_nm_s.iter();
         EnergySample {
             kinetic_j: plant.kinetic_energy_j(),
             elastic_j: plant.elastic_energy_j(),
             weight_j: plant.weight_energy_j(),
-            approach_j: monitor.approach_potential_j,
-            attitude_j: monitor.attitude_potential_j,
-            integral_j: monitor.integral_potential_j,
+            approach_j,
+            attitude_j,
+            integral_j,
             motors_j: flows.motors,
             pushes_j: flows.pushes,
             damping_j: gains.zip(&flows.joint_speeds_squared).map(|(gain, squares)| gain * squares).sum(),
@@ -94,8 +96,10 @@ impl Observer {
     fn contacts(&self, plant: &Plant, force_share: f64) -> Vec<ContactSample> {
         let hand: &Hand = &plant.model().hand;
         let posture = plant.posture();
-        let pulls = self.law.approach_wrenches(hand, posture);
-        let turns = self.law.attitude_wrenches(hand, posture, &self.latch);
+        let law = &self.laws.grasp;
+        let [force_n, stiffness_nm] = self.laws.gains().grasp;
+        let pulls = law.approach_wrenches(hand, posture, force_n);
+        let turns = law.attitude_wrenches(hand, posture, &self.latch.grasp, stiffness_nm);
         let forces = plant.forces().iter().zip(&posture.centres_m);
         plant
             .contacts()

@@ -58,6 +58,7 @@ impl Recorder {
             clock: Clock::Emulated,
             reset: ResetCause::PowerOn,
             crash: None,
+            changed: 0,
         })
         .with_hand(&hand);
         about.hand_hash = about.hand_model().map_or(0, |model| model.hash());

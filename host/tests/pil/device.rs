@@ -11,7 +11,7 @@ use blindgrasp_shared::device::{Device, Inputs, Reading};
 use blindgrasp_shared::identity::{Clock, Identity, Image, ResetCause, UNITS};
 use blindgrasp_shared::link::message::{Reply, not_understood};
 use blindgrasp_shared::link::{Receiver, encode, most_bytes};
-use blindgrasp_shared::settings::Parameter;
+use blindgrasp_shared::parameters::Parameter;
 use blindgrasp_shared::telemetry::INTERFACE_VERSION;
 use blindgrasp_shared::telemetry::burst::Burst;
 use blindgrasp_shared::tick::Params;
@@ -94,7 +94,8 @@ impl Firmware {
             _ => {}
         }
         let clock = Clock::Emulated;
-        let identity = Identity { image, units: UNITS, clock, reset: ResetCause::Unknown, crash: None };
+        let identity =
+            Identity { image, units: UNITS, clock, reset: ResetCause::Unknown, crash: None, changed: 0 };
         let params = Params::new(hand.hand.cast(), &hand.config).expect("parameters");
         Self {
             device: Device::new(params, identity),

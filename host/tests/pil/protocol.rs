@@ -6,13 +6,13 @@ use blindgrasp::device::pil::{Linked, PilError, Pilot, Plan};
 use blindgrasp::record::compare::Value;
 use blindgrasp::scene::Scene;
 use blindgrasp::sim::{Run, Simulation};
-use blindgrasp_shared::settings::Parameter;
+use blindgrasp_shared::parameters::Parameter;
 use std::time::{Duration, Instant};
 
 /// Ticks before the grasp of a scene that changes nothing: hello, 11 parameters of the hand, 9 of each of 12 joints, 3 of
 /// gravity, a heartbeat, arming; the slew limit and what else is switched off is asked for, too.
 fn ticks_before(scene: &Scene) -> u32 {
-    use blindgrasp_shared::settings::Each;
+    use blindgrasp_shared::parameters::Each;
     let joints = scene.joints.len() as u32;
     let asked: u32 = Parameter::ALL
         .iter()
@@ -136,7 +136,7 @@ fn another_interface_image_or_past_is_told() {
 
 #[test]
 fn a_parameter_that_is_refused_is_named() {
-    let error = error(&["control.damping_scale=2"], Wrong::Refuses(Parameter::Damping));
+    let error = error(&["control.damping_scale=2"], Wrong::Refuses(Parameter::DAMPING));
     assert_says(&error, &["refuses the scene's `damping_nm_s` [0] = ", "out of its range"]);
 }
 
@@ -149,7 +149,7 @@ fn what_is_switched_off_on_one_side_only_is_named() {
     );
     assert_says(
         &error("actuators.torque_limits=false"),
-        &["`limits.force_n` is switched off in the scene and on"],
+        &["`limits.gains.grasp[0]` is switched off in the scene and on"],
     );
 }
 

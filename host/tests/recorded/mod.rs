@@ -13,7 +13,7 @@ use blindgrasp_shared::identity::{Clock, Identity, Image, ResetCause, UNITS};
 use blindgrasp_shared::link::message::{Packet, Reply, Request, Signals};
 use blindgrasp_shared::link::{Receiver, Sender, most_bytes};
 use blindgrasp_shared::math::Real;
-use blindgrasp_shared::settings::Parameter;
+use blindgrasp_shared::parameters::Parameter;
 use blindgrasp_shared::telemetry::burst::Burst;
 use blindgrasp_shared::telemetry::{INTERFACE_VERSION, Record};
 use blindgrasp_shared::tick::{Config, Input, Params, State, tick};
@@ -99,7 +99,7 @@ fn device(model: &HandModel) -> Device<MAX_JOINTS, MAX_FINGERS> {
         period_us: model.config.period_us,
     };
     let reset = ResetCause::PowerOn;
-    let identity = Identity { image, units: UNITS, clock: Clock::External, reset, crash: None };
+    let identity = Identity { image, units: UNITS, clock: Clock::External, reset, crash: None, changed: 0 };
     Device::new(Params::new(model.hand.cast(), &model.config).unwrap(), identity)
 }
 
@@ -267,7 +267,7 @@ impl Session {
     pub(crate) fn set(&mut self, parameter: Parameter, index: u8, value: f32) {
         self.turn(Some(Request::SetParameter { parameter, index, value }), Fate::Arrives);
         let now = self.device.params().get(parameter, index).unwrap();
-        let setting = Setting { parameter, index, value: Some(now) };
+        let setting = Setting { parameter, index, value: Some(now.value) };
         self.writer.parameters(self.recorded, self.now(), &[setting]).unwrap();
     }
 

@@ -44,6 +44,7 @@ pub(crate) fn about(hand: &str) -> About {
         clock: Clock::External,
         reset: ResetCause::PowerOn,
         crash: None,
+        changed: 0,
     })
     .with_hand(&file)
 }
@@ -90,16 +91,16 @@ impl Hand {
         record.reading_failed = failed.then(|| Raised::at(0, Fault::SampleMissing));
         record.events = Events::NONE.with(Event::Heartbeat, random.bool()).with(Event::Late, limited);
         let mut float = |scale: f32| scale * (random.f32() - 0.5);
-        record.force_n = float(20.0);
-        record.attitude_stiffness_nm = float(0.01);
-        record.approach_potential_j = float(1.0);
-        record.attitude_potential_j = float(1.0);
+        record.gains.grasp[0] = float(20.0);
+        record.gains.grasp[1] = float(0.01);
+        record.potentials_j.grasp[0] = float(1.0);
+        record.potentials_j.grasp[1] = float(1.0);
         record.work_j = float(1.0);
         record.damped_j = float(1.0);
         record.excess_j = float(1.0);
         if limited {
-            record.integral_gain_nm_rad = float(0.1);
-            record.integral_potential_j = float(1.0);
+            record.gains.integral[0] = float(0.1);
+            record.potentials_j.integral[0] = float(1.0);
         }
         let mut torques = [0.0; MAX_JOINTS];
         torques[..self.joints].iter_mut().for_each(|torque| *torque = float(3.0));

@@ -17,20 +17,84 @@
 //!
 //! The paper names this law without printing it (Secs. 1 and 3). One gain serves all joints.
 
+use super::{Effect, Gain, Law, Ramp, Signal, Stance};
+use crate::bytes::{BufferTooSmall, Loader, Saver, SnapshotError};
+use crate::hand::{Hand, Posture};
 use crate::math::Real;
+use core::marker::PhantomData;
 
-/// Adds `u_I` to the torques, N m. Returns `V_I`, J.
-pub(super) fn pull_back<T: Real, const J: usize>(
-    gain_nm_rad: T,
-    latched_rad: &[T; J],
-    angles_rad: &[T; J],
-    torques_nm: &mut [T; J],
-) -> T {
-    let mut squares = T::zero();
-    for ((torque, angle), latched) in torques_nm.iter_mut().zip(angles_rad).zip(latched_rad) {
-        let turned = *angle - *latched;
-        *torque -= gain_nm_rad * turned;
-        squares += turned * turned;
+/// `K_I`.
+pub const GAINS: [Gain; 1] = [Gain {
+    key: "integral_gain_nm_rad",
+    unit: "N m/rad",
+    words: "Gain K_I of the earlier law's integral of each joint's velocity; zero leaves it out",
+    ramp: Ramp::Stiffness,
+    potential: Signal {
+        key: "integral_potential_j",
+        unit: "J",
+        words: "Potential V_I of the joints' turns since the grasp began",
+    },
+}];
+
+/// None but its potential.
+pub const SIGNALS: [Signal; 0] = [];
+
+/// The joint angles when the grasp began, rad.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Latch<T, const J: usize, const F: usize> {
+    angles_rad: [T; J],
+}
+
+impl<const J: usize, const F: usize> Latch<f32, J, F> {
+    pub(super) fn save(
+        &self,
+        joints: usize,
+        _fingertips: usize,
+        to: &mut Saver<'_>,
+    ) -> Result<(), BufferTooSmall> {
+        to.f32s(&self.angles_rad, joints)
     }
-    squares * gain_nm_rad * T::from_f64(0.5)
+
+    pub(super) fn load(
+        joints: usize,
+        _fingertips: usize,
+        from: &mut Loader<'_>,
+    ) -> Result<Self, SnapshotError> {
+        let mut angles_rad = [0.0; J];
+        from.f32s(&mut angles_rad, joints)?;
+        Ok(Self { angles_rad })
+    }
+}
+
+/// The law, which needs to know nothing of the hand beforehand.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct IntegralLaw<T>(PhantomData<T>);
+
+impl<T: Real, const J: usize, const F: usize> Law<T, J, F, 1, 0> for IntegralLaw<T> {
+    type Latch = Latch<T, J, F>;
+
+    fn prepare(_hand: &Hand<T, J, F>) -> Self {
+        Self(PhantomData)
+    }
+
+    fn latch(_posture: &Posture<T, J, F>, angles_rad: &[T; J]) -> Latch<T, J, F> {
+        Latch { angles_rad: *angles_rad }
+    }
+
+    fn torques(
+        &self,
+        stance: &Stance<'_, T, J, F>,
+        latch: &Latch<T, J, F>,
+        &[gain_nm_rad]: &[T; 1],
+        torques_nm: &mut [T; J],
+    ) -> Effect<T, 1, 0> {
+        let mut squares = T::zero();
+        for ((torque, angle), latched) in torques_nm.iter_mut().zip(stance.angles_rad).zip(&latch.angles_rad)
+        {
+            let turned = *angle - *latched;
+            *torque -= gain_nm_rad * turned;
+            squares += turned * turned;
+        }
+        Effect { potentials_j: [squares * gain_nm_rad * T::from_f64(0.5)], signals: [] }
+    }
 }

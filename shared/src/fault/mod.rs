@@ -8,7 +8,7 @@
 
 mod watch;
 
-pub use watch::{Driven, FaultConfig, FrozenConfig, Watch, Watched};
+pub use watch::{Driven, FaultConfig, Watch, Watched};
 
 use core::fmt;
 use serde::{Deserialize, Serialize};

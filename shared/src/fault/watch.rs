@@ -21,8 +21,17 @@ pub struct FaultConfig<const J: usize> {
     pub range_slack_rad: Option<f32>,
     /// How long a torque may stay at its limit, ms.
     pub saturated_ms: Option<u32>,
-    /// When a counter that stands still is not believed.
-    pub frozen: Option<FrozenConfig<J>>,
+    /// Change of the torque since the last count that is too much for a joint that stands still, N m: well above its
+    /// friction. A counter that stands still is not believed when this changes, and a neighbour turns, for the time below. A
+    /// joint may stand still for hours; and in a grasp, a closed chain of rolling contacts, most of its torque limit may come
+    /// and go without a count. What hardly ever happens is that its neighbours turn far, and its torque changes, and it does
+    /// not move at all. Not never: the knee of a finger that is pushed to and fro stands still where its angle is at an
+    /// extremum, and in a straight finger.
+    pub frozen_torque_nm: Option<[f32; J]>,
+    /// Turn of the joint before or after it since then, rad.
+    pub frozen_neighbour_rad: Option<f32>,
+    /// Shortest standstill that counts, ms.
+    pub frozen_ms: Option<u32>,
     /// How long the host's heartbeat may fail while the hand has torque, ms.
     pub heartbeat_ms: Option<u32>,
     /// How many ticks in a row may be late; on average one in ten.
@@ -32,21 +41,6 @@ pub struct FaultConfig<const J: usize> {
     pub energy_j: Option<f32>,
 }
 
-/// When a counter that stands still is not believed. A joint may stand still for hours; and in a grasp, a closed chain
-/// of rolling contacts, most of its torque limit may come and go without a count. What hardly ever happens is that its
-/// neighbours turn far, and its torque changes, and it does not move at all. Not never: the knee of a finger that is
-/// pushed to and fro stands still where its angle is at an extremum, and in a straight finger.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct FrozenConfig<const J: usize> {
-    /// Change of the torque since the last count that is too much for a joint that stands still, N m: well above its
-    /// friction.
-    pub torque_nm: [f32; J],
-    /// Turn of the joint before or after it since then, rad.
-    pub neighbour_rad: f32,
-    /// Shortest standstill that counts, ms.
-    pub after_ms: u32,
-}
-
 impl<const J: usize> FaultConfig<J> {
     /// Only what can't be left out: missing samples and what is not finite.
     pub const LEAST: Self = Self {
@@ -54,7 +48,9 @@ impl<const J: usize> FaultConfig<J> {
         speed_limit_rad_s: None,
         range_slack_rad: None,
         saturated_ms: None,
-        frozen: None,
+        frozen_torque_nm: None,
+        frozen_neighbour_rad: None,
+        frozen_ms: None,
         heartbeat_ms: None,
         late_ticks: None,
         energy_j: None,
@@ -72,21 +68,25 @@ impl<const J: usize> FaultConfig<J> {
     ) -> Result<Watch<J>, ParameterError> {
         let joint_count = hand.joint_count().min(J);
         let mut joints = [JointWatch::OFF; J];
-        if self.frozen.is_some_and(|f| !(f.neighbour_rad > 0.0 && f.neighbour_rad.is_finite())) {
+        if self.frozen_neighbour_rad.is_some_and(|turn| !(turn > 0.0 && turn.is_finite())) {
             let reason = "has to be positive";
-            return Err(ParameterError { parameter: "faults.frozen_neighbour_rad", joint: None, reason });
+            return Err(ParameterError {
+                parameter: "faults.frozen_neighbour_rad".into(),
+                joint: None,
+                reason,
+            });
         }
         if self.range_slack_rad.is_some_and(|slack| !(slack >= 0.0 && slack.is_finite())) {
             let reason = "has to be zero or positive";
-            return Err(ParameterError { parameter: "faults.range_slack_rad", joint: None, reason });
+            return Err(ParameterError { parameter: "faults.range_slack_rad".into(), joint: None, reason });
         }
         for (k, joint) in joints.iter_mut().enumerate().take(joint_count) {
-            let positive = |parameter, v: f32| {
+            let positive = |parameter: &'static str, v: f32| {
                 let reason = "has to be positive";
                 if v > 0.0 && v.is_finite() {
                     Ok(v)
                 } else {
-                    Err(ParameterError { parameter, joint: Some(k), reason })
+                    Err(ParameterError { parameter: parameter.into(), joint: Some(k), reason })
                 }
             };
             if let Some(speeds) = self.possible_speed_rad_s {
@@ -97,8 +97,8 @@ impl<const J: usize> FaultConfig<J> {
             if let Some(speeds) = self.speed_limit_rad_s {
                 joint.speed_rad_s = Some(positive("faults.speed_limit_rad_s", speeds[k])?);
             }
-            if let Some(frozen) = &self.frozen {
-                joint.frozen_nm = Some(positive("faults.frozen_torque_nm", frozen.torque_nm[k])?);
+            if let Some(torques) = &self.frozen_torque_nm {
+                joint.frozen_nm = Some(positive("faults.frozen_torque_nm", torques[k])?);
             }
             if let Some(slack) = self.range_slack_rad {
                 let (lower, upper) = hand.range_rad(k);
@@ -107,11 +107,11 @@ impl<const J: usize> FaultConfig<J> {
         }
         if self.energy_j.is_some_and(|energy| !(energy > 0.0 && energy.is_finite())) {
             let reason = "has to be positive";
-            return Err(ParameterError { parameter: "faults.energy_j", joint: None, reason });
+            return Err(ParameterError { parameter: "faults.energy_j".into(), joint: None, reason });
         }
         if self.late_ticks.is_some_and(|ticks| ticks > LATE_TICKS_MOST) {
             let reason = "has to be at most 1000";
-            return Err(ParameterError { parameter: "faults.late_ticks", joint: None, reason });
+            return Err(ParameterError { parameter: "faults.late_ticks".into(), joint: None, reason });
         }
         for k in 0..joint_count {
             let parent = hand.parent(k);
@@ -130,10 +130,10 @@ impl<const J: usize> FaultConfig<J> {
             joint_count,
             joints,
             saturated_ticks: ticks(self.saturated_ms, "faults.saturated_ms")?,
-            frozen_ticks: ticks(self.frozen.map(|frozen| frozen.after_ms), "faults.frozen_ms")?,
+            frozen_ticks: ticks(self.frozen_ms, "faults.frozen_ms")?,
             heartbeat_ticks: ticks(self.heartbeat_ms, "faults.heartbeat_ms")?,
             late_most: self.late_ticks.map(|ticks| ticks * LATE_WEIGHT),
-            neighbour_rad: self.frozen.map_or(0.0, |frozen| frozen.neighbour_rad),
+            neighbour_rad: self.frozen_neighbour_rad.unwrap_or(f32::INFINITY),
             energy_j: self.energy_j,
         })
     }

@@ -10,7 +10,7 @@
 use crate::command::{Command, Refusal};
 use crate::fault::Raised;
 use crate::identity::Identity;
-use crate::settings::Parameter;
+use crate::parameters::{Parameter, Setting};
 use crate::telemetry::snapshot::Part;
 use crate::telemetry::{DecodeError, List, Record};
 use core::fmt;
@@ -170,8 +170,8 @@ pub enum Reply<'a, const J: usize> {
         parameter: Parameter,
         /// Of which joint or axis.
         index: u8,
-        /// What it is.
-        value: f32,
+        /// Its value, and that of the hand's file.
+        setting: Setting,
     },
     /// What a tick did.
     Record(Record<J>),

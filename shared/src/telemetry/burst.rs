@@ -1,10 +1,7 @@
 //! The records around a fault, at full rate, whatever the telemetry sends.
 
-use super::{LAW, List, Record};
-use crate::command::{Answer, Command, Grasp, Refusal};
-use crate::event::Events;
-use crate::fault::{Fault, Raised};
-use crate::limit::Limiting;
+use super::Record;
+use crate::signals::Kept;
 use crate::supervisor::Mode;
 
 /// Records before the tick that entered the fault, at most.
@@ -16,7 +13,7 @@ pub const AFTER: usize = 64;
 /// the ring of 256 some 50 KiB: too much for a stack, so that it is made where it stays.
 #[derive(Clone, Debug)]
 pub struct Burst<const J: usize> {
-    ring: [Slot<J>; BEFORE + AFTER],
+    ring: [Kept<J>; BEFORE + AFTER],
     /// Where the next record goes; the oldest is there too, once the ring is full.
     next: usize,
     /// Records in the ring.
@@ -52,127 +49,10 @@ pub enum Caught<const J: usize> {
     },
 }
 
-/// A record, such that an empty one is all zeros: the ring is then no part of an image. With `Option`s it would be, for
-/// what they have instead of a value is no zero.
-#[derive(Clone, Debug)]
-struct Slot<const J: usize> {
-    tick: u32,
-    mode: Mode,
-    events: Events,
-    fault: Mark,
-    reading_failed: Mark,
-    command: Command,
-    answer: u8,
-    law: [f32; LAW],
-    cycles: u32,
-    late_ticks: u32,
-    dropped: u32,
-    counts: List<i32, J>,
-    torques_nm: List<f32, J>,
-    limiting: List<Limiting, J>,
-}
-
-// What became of a command: nothing was asked, it was done, or refused for the reason of this number and those above.
-const NO_ANSWER: u8 = 0;
-const DONE: u8 = 1;
-const REFUSED: u8 = 2;
-
-impl<const J: usize> Slot<J> {
-    const BLANK: Self = Self {
-        tick: 0,
-        mode: Mode::Disarmed,
-        events: Events::NONE,
-        fault: Mark::NONE,
-        reading_failed: Mark::NONE,
-        command: Command::Grasp(Grasp::CONFIGURED),
-        answer: NO_ANSWER,
-        law: [0.0; LAW],
-        cycles: 0,
-        late_ticks: 0,
-        dropped: 0,
-        counts: List::empty(0),
-        torques_nm: List::empty(0.0),
-        limiting: List::empty(Limiting::NONE),
-    };
-
-    fn keep(&mut self, record: &Record<J>) {
-        *self = Self {
-            tick: record.tick,
-            mode: record.mode,
-            events: record.events,
-            fault: Mark::of(record.fault),
-            reading_failed: Mark::of(record.reading_failed),
-            command: record.answer.map_or(Self::BLANK.command, |answer| answer.command),
-            answer: match record.answer {
-                None => NO_ANSWER,
-                Some(Answer { refused: None, .. }) => DONE,
-                Some(Answer { refused: Some(refusal), .. }) => REFUSED + refusal as u8,
-            },
-            law: record.law(),
-            cycles: record.cycles,
-            late_ticks: record.late_ticks,
-            dropped: record.dropped,
-            counts: record.counts,
-            torques_nm: record.torques_nm,
-            limiting: record.limiting,
-        };
-    }
-
-    /// Numbered by its tick: it is one of all of them.
-    fn record(&self) -> Record<J> {
-        let refused =
-            self.answer.checked_sub(REFUSED).and_then(|k| Refusal::ALL.get(usize::from(k))).copied();
-        Record {
-            sequence: self.tick,
-            tick: self.tick,
-            mode: self.mode,
-            fault: self.fault.raised(),
-            answer: (self.answer != NO_ANSWER).then_some(Answer { command: self.command, refused }),
-            events: self.events,
-            reading_failed: self.reading_failed.raised(),
-            cycles: self.cycles,
-            late_ticks: self.late_ticks,
-            dropped: self.dropped,
-            decimation: 1,
-            counts: self.counts,
-            torques_nm: self.torques_nm,
-            limiting: self.limiting,
-            ..Record::BLANK
-        }
-        .with_law(self.law)
-    }
-}
-
-/// A fault, or none.
-#[derive(Clone, Copy, Debug)]
-struct Mark {
-    /// Number of the fault; none has 0.
-    number: u8,
-    has_joint: bool,
-    joint: u8,
-}
-
-impl Mark {
-    const NONE: Self = Self { number: 0, has_joint: false, joint: 0 };
-
-    fn of(raised: Option<Raised>) -> Self {
-        raised.map_or(Self::NONE, |Raised { fault, joint }| Self {
-            number: fault.number(),
-            has_joint: joint.is_some(),
-            joint: joint.unwrap_or(0),
-        })
-    }
-
-    fn raised(self) -> Option<Raised> {
-        Fault::from_number(self.number)
-            .map(|fault| Raised { fault, joint: self.has_joint.then_some(self.joint) })
-    }
-}
-
 impl<const J: usize> Burst<J> {
     /// An empty ring.
     pub const fn new() -> Self {
-        Self { ring: [const { Slot::BLANK }; BEFORE + AFTER], next: 0, count: 0, phase: Phase::Watching }
+        Self { ring: [const { Kept::BLANK }; BEFORE + AFTER], next: 0, count: 0, phase: Phase::Watching }
     }
 
     /// Takes the record of a tick: one copy, at most.
@@ -229,6 +109,10 @@ impl<const J: usize> Default for Burst<J> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::command::{Answer, Command, Refusal};
+    use crate::control::PerGain;
+    use crate::fault::{Fault, Raised};
+    use crate::list::List;
     use std::boxed::Box;
 
     #[test]
@@ -249,7 +133,7 @@ mod tests {
                 answer,
                 fault: Fault::ALL.get(tick as usize % 20).map(|&fault| Raised::at(tick as usize % 3, fault)),
                 reading_failed: (tick % 2 == 0).then_some(Raised::of_hand(Fault::OutputFailed)),
-                force_n: 5.0,
+                gains: PerGain::all(5.0),
                 work_j: -1e-9,
                 excess_j: 1e-3,
                 cycles: 123,

@@ -2,7 +2,7 @@
 
 use super::Params;
 use crate::bytes::{BufferTooSmall, Loader, Saver, SnapshotError};
-use crate::control::{Gains, Latch};
+use crate::control::{Latch, PerGain};
 use crate::estimate::{Motion, Tracks};
 use crate::fault::{Raised, Watched};
 use crate::hand::Posture;
@@ -18,7 +18,7 @@ pub struct State<const J: usize, const F: usize> {
     pub(super) supervisor: Supervisor,
     pub(super) watched: Watched<J>,
     /// How firm this grasp is, when it is at its full force.
-    pub(super) grasp: Gains<f32>,
+    pub(super) grasp: PerGain<f32>,
     /// How the hand stood when the grasp began, while there is one.
     pub(super) latch: Option<Latch<f32, J, F>>,
     /// Where everything was in the last tick with torque.
@@ -37,7 +37,7 @@ impl<const J: usize, const F: usize> State<J, F> {
             motion: Motion::still(),
             supervisor: Supervisor::new(),
             watched: Watched::new(),
-            grasp: Gains::none(),
+            grasp: PerGain::all(0.0),
             latch: None,
             posture: Posture::at_base(),
             torques_nm: [0.0; J],
@@ -88,9 +88,7 @@ impl<const J: usize, const F: usize> State<J, F> {
         to.u8(fingertips as u8)?;
         to.u32(self.ticks)?;
         self.supervisor.save(&mut to)?;
-        to.f32(self.grasp.force_n)?;
-        to.f32(self.grasp.attitude_stiffness_nm)?;
-        to.f32(self.grasp.integral_gain_nm_rad)?;
+        self.grasp.iter().try_for_each(|&gain| to.f32(gain))?;
         self.watched.save(joints, &mut to)?;
         self.tracks.save(joints, &mut to)?;
         self.motion.save(joints, &mut to)?;
@@ -118,11 +116,7 @@ impl<const J: usize, const F: usize> State<J, F> {
         let mut state = Self::new();
         state.ticks = from.u32()?;
         state.supervisor = Supervisor::load(&mut from)?;
-        state.grasp = Gains {
-            force_n: from.f32()?,
-            attitude_stiffness_nm: from.f32()?,
-            integral_gain_nm_rad: from.f32()?,
-        };
+        state.grasp.iter_mut().try_for_each(|gain| from.f32().map(|read| *gain = read))?;
         state.watched = Watched::load(joints, &mut from)?;
         state.tracks = Tracks::load(joints, &mut from)?;
         state.motion = Motion::load(joints, &mut from)?;

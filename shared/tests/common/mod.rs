@@ -2,11 +2,11 @@
 
 #![allow(dead_code, reason = "each test file uses its part")]
 
-use blindgrasp_shared::control::GraspConfig;
+use blindgrasp_shared::control::{Chosen, Hold, LawsConfig, PerGain};
 use blindgrasp_shared::estimate::{Encoder, EstimatorConfig};
-use blindgrasp_shared::fault::{FaultConfig, FrozenConfig};
+use blindgrasp_shared::fault::FaultConfig;
 use blindgrasp_shared::hand::{Fingertip, Hand, Joint, Link};
-use blindgrasp_shared::limit::{LimitConfig, StopConfig};
+use blindgrasp_shared::limit::LimitConfig;
 use blindgrasp_shared::math::Real;
 use blindgrasp_shared::supervisor::SupervisorConfig;
 use blindgrasp_shared::tick::{Config, Params};
@@ -79,31 +79,27 @@ pub(crate) fn config<const J: usize>() -> Config<J> {
     Config {
         period_us: 1000,
         estimator: EstimatorConfig { bandwidth_hz: 100.0, encoders: [encoder; J] },
-        law: GraspConfig {
-            force_n: 5.0,
-            attitude_stiffness_nm: 5e-3,
-            integral_gain_nm_rad: 0.0,
-            damping_nm_s,
-            gravity_m_s2: Some(vector(0.0, 0.0, -9.81)),
+        laws: LawsConfig {
+            gains: PerGain { grasp: [5.0, 5e-3], ..PerGain::all(0.0) },
+            chosen: Chosen::ALL,
+            hold: Hold { damping_nm_s, gravity_m_s2: Some(vector(0.0, 0.0, -9.81)) },
         },
         limits: LimitConfig {
-            force_n: Some(500.0),
-            attitude_stiffness_nm: Some(0.1),
-            integral_gain_nm_rad: Some(1.0),
+            gains: PerGain { grasp: [Some(500.0), Some(0.1)], ..PerGain::all(Some(1.0)) },
             torque_nm: Some([TORQUE_NM as f32; J]),
             slew_nm_s: Some([SLEW_NM_S as f32; J]),
-            stops: Some(StopConfig {
-                margin_rad: [0.1; J],
-                stiffness_nm_rad: [2.0; J],
-                damping_nm_s: [0.01; J],
-            }),
+            stop_margin_rad: Some([0.1; J]),
+            stop_stiffness_nm_rad: Some([2.0; J]),
+            stop_damping_nm_s: Some([0.01; J]),
         },
         faults: FaultConfig {
             possible_speed_rad_s: Some([200.0; J]),
             speed_limit_rad_s: Some([20.0; J]),
             range_slack_rad: Some(0.05),
             saturated_ms: Some(200),
-            frozen: Some(FrozenConfig { torque_nm: [0.02; J], neighbour_rad: 0.03, after_ms: 50 }),
+            frozen_torque_nm: Some([0.02; J]),
+            frozen_neighbour_rad: Some(0.03),
+            frozen_ms: Some(50),
             heartbeat_ms: None,
             late_ticks: Some(3),
             energy_j: Some(1.0),

@@ -126,7 +126,7 @@ fn scene_like(arguments: &Arguments) -> anyhow::Result<SceneFile> {
     }
     let mut like = template(hand, object, arguments.ideal)?;
     if let Some(force_n) = arguments.force_n {
-        like.control.force_n = force_n;
+        like.control.gains.grasp[0] = force_n;
     }
     if let Some(text) = &arguments.position {
         like.pose.position_m = three("--position", text)?;

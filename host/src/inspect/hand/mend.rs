@@ -197,8 +197,8 @@ fn mend_fingertip(tip: &mut FingertipFile, key: &str) {
 fn mend_control(control: &mut Control, key: &str) {
     match key {
         "period_s" => control.period_s = 1e-3,
-        "force_n" => control.force_n = 1.0,
-        "attitude_stiffness_nm" => control.attitude_stiffness_nm = 0.0,
+        "force_n" => control.gains.grasp[0] = 1.0,
+        "attitude_stiffness_nm" => control.gains.grasp[1] = 0.0,
         "damping_scale" => control.damping_scale = 1.0,
         "soft_start_s" => control.soft_start_s = 0.0,
         "estimator_bandwidth_hz" => control.estimator_bandwidth_hz = 0.05 / control.period_s,

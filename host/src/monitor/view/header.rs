@@ -2,6 +2,7 @@
 
 use super::super::model::{Level, Link, Model};
 use super::{Screen, Source, fit, fixed};
+use blindgrasp_shared::control::GAINS;
 use blindgrasp_shared::event::Event;
 use blindgrasp_shared::supervisor::Mode;
 use ratatui::style::{Modifier, Style};
@@ -64,10 +65,10 @@ fn state<'a>(model: &'a Model, screen: &Screen<'a>, now: Duration, width: usize)
     if record.events.contains(Event::FallbackClock) {
         parts.push(Span::styled("fall-back clock", palette.warning()));
     }
-    parts.push(Span::raw(format!("force {:.2} N", record.force_n)));
-    parts.push(Span::raw(format!("stiffness {:.4} N m", record.attitude_stiffness_nm)));
-    if record.integral_gain_nm_rad > 0.0 {
-        parts.push(Span::raw(format!("integral {:.4} N m/rad", record.integral_gain_nm_rad)));
+    for (gain, value) in GAINS.iter().zip(record.gains.iter()) {
+        if *value > 0.0 {
+            parts.push(Span::raw(format!("{} {}", gain.key, fixed(*value, 4))));
+        }
     }
     parts.push(Span::raw(format!("work {} J", fixed(record.work_j, 3))));
     parts.push(Span::raw(format!("excess {} J", fixed(record.excess_j, 3))));

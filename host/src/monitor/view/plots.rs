@@ -66,13 +66,14 @@ fn title(model: &Model, screen: &Screen<'_>, joint: Option<usize>) -> String {
         known.unwrap_or_else(|| format!("joint {joint}"))
     };
     let what = match (screen.plot, model.hand().is_some()) {
-        (Plot::Angles, false) => "counts",
-        (Plot::Speeds, false) => "counts a second",
+        (Plot::Angles, false) => "counts".to_owned(),
+        (Plot::Speeds, false) => "counts a second".to_owned(),
         (plot, _) => plot.words(),
     };
     let whose = match joint {
         _ if !screen.plot.is_of_joints() => {
-            let named = screen.plot.signals().iter().zip(MARKERS);
+            let names = screen.plot.signals();
+            let named = names.iter().zip(MARKERS);
             let named = named.map(|(name, (_, looks))| format!("{name} ({looks})")).collect::<Vec<_>>();
             if named.is_empty() { String::new() } else { format!(": {}", named.join(", ")) }
         }

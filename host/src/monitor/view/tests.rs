@@ -4,9 +4,10 @@ use super::super::model::tests::{fed, ms, record, session};
 use super::super::model::{Level, News};
 use super::*;
 use crate::wire::Record;
+use blindgrasp_shared::control::PerGain;
 use blindgrasp_shared::fault::{Fault, Raised};
 use blindgrasp_shared::limit::{Limit, Limiting};
-use blindgrasp_shared::settings::Parameter;
+use blindgrasp_shared::parameters::Parameter;
 use blindgrasp_shared::supervisor::Mode;
 use blindgrasp_shared::telemetry::List;
 use ratatui::Terminal;
@@ -42,7 +43,7 @@ fn text(model: &Model, screen: &Screen<'_>, now: Duration, width: u16, height: u
 /// A hand that grasps, with a joint at its torque limit.
 fn grasping() -> Model {
     let mut model = fed(1..2990);
-    model.take(ms(10), News::Setting { parameter: Parameter::HeartbeatTime, index: 0, value: Some(250.0) });
+    model.take(ms(10), News::Setting { parameter: Parameter::HEARTBEAT_TIME, index: 0, value: Some(250.0) });
     model.take(ms(2950), News::Heartbeat);
     model.take(ms(2960), News::Notice(Level::Info, "grasp: done".into()));
     let mut limiting = [Limiting::NONE; crate::MAX_JOINTS];
@@ -50,7 +51,7 @@ fn grasping() -> Model {
     let torques = std::array::from_fn(|k| if k == 2 { 1.3878 } else { 0.1 * k as f32 });
     let held = Record {
         mode: Mode::Grasping,
-        force_n: 5.0,
+        gains: PerGain { grasp: [5.0, 0.0], ..PerGain::all(0.0) },
         limiting: List::first_of(limiting, 12),
         torques_nm: List::first_of(torques, 12),
         ..record(2990)

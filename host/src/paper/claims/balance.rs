@@ -77,7 +77,7 @@ fn sums(done: &Done, sample: &Sample) -> (JointVector, JointVector) {
 
 /// How long the torsional viscosity takes to let go, `b / K_st`, s: the longest of the fingertips; none without `u_st`.
 pub(super) fn torsion_time_s(done: &Done, sample: &Sample) -> Option<f64> {
-    let stiffness_nm = done.scene.control.attitude_stiffness_nm;
+    let stiffness_nm = done.scene.control.attitude_stiffness_nm();
     let tips = done.scene.fingertips.iter().zip(&sample.contacts);
     let viscosity = tips.map(|(tip, contact)| {
         let pressed_m = contact.indentation_m;

@@ -23,7 +23,7 @@ pub(super) fn bound(evidence: &Evidence) -> Result<Claim, EvidenceError> {
 
 /// The bound of Eq. 49, N m, and `E` of Eq. 40 with the print's own `V_st`, J.
 fn evaluated(done: &Done, sample: &Sample) -> (f64, f64) {
-    let stiffness_nm = done.scene.control.attitude_stiffness_nm;
+    let stiffness_nm = done.scene.control.attitude_stiffness_nm();
     let most = 3.0 * done.scene.hand.fingertip_count() as f64;
     // Eq. 44 with its constant is K_st (3 N - sum of the traces). Where the traces sum to nothing or less, any K_st will do.
     let traces = most - sample.energies.attitude_j / stiffness_nm;
@@ -32,7 +32,7 @@ fn evaluated(done: &Done, sample: &Sample) -> (f64, f64) {
 }
 
 pub(super) fn bound_row(done: &Done) -> Row {
-    let stiffness_nm = done.scene.control.attitude_stiffness_nm;
+    let stiffness_nm = done.scene.control.attitude_stiffness_nm();
     let samples = &done.run.samples;
     let least = samples
         .iter()

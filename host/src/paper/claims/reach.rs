@@ -40,7 +40,7 @@ pub(super) fn reach_row(done: &Done) -> Row {
     let (Some(first), Some(calm)) = (done.run.samples.first(), calm(done)) else {
         return row(done, "no sample".to_owned(), Verdict::NotReproduced);
     };
-    let most_nm = LONGEST * done.scene.control.attitude_stiffness_nm;
+    let most_nm = LONGEST * done.scene.control.attitude_stiffness_nm();
     let (start_nm, calm_nm) = (needed_nm(done, first), needed_nm(done, calm));
     let (held, holds) = (done.summary().grasp_held, start_nm <= most_nm);
     let words = format!(

@@ -43,7 +43,7 @@ pub(super) fn contact_row(done: &Done) -> Row {
         ),
     };
     if !held && done.name.starts_with("hand-arm") {
-        let k_st = done.scene.control.attitude_stiffness_nm;
+        let k_st = done.scene.control.attitude_stiffness_nm();
         row.remark = format!(
             "K_st = {} N m is small against what rolls the fingertips (tangential force times radius, about 0.4 N m): the \
              grasp creeps, held back by the torsional viscosity of the fingertips alone, until it snaps through",

@@ -5,7 +5,7 @@ use crate::MAX_JOINTS;
 use crate::paper::claim::{Claim, Figure, Row, Verdict, number};
 use crate::paper::evidence::{Done, Evidence, EvidenceError};
 use crate::plant::dynamics::JointVector;
-use crate::sim::law;
+use crate::sim::laws;
 use blindgrasp_shared::control::Latch;
 use blindgrasp_shared::hand::Wrench;
 use nalgebra::Vector3;
@@ -30,7 +30,7 @@ pub(super) fn balanced(evidence: &Evidence) -> Result<Claim, EvidenceError> {
 
 pub(super) fn balanced_row(done: &Done) -> Row {
     let scene = &done.scene;
-    let (Ok(law), Some(first)) = (law(scene), done.run.samples.first()) else {
+    let (Ok(laws), Some(first)) = (laws(scene), done.run.samples.first()) else {
         return row(done, "no sample".to_owned(), Verdict::NotReproduced);
     };
     let hand = &scene.hand;
@@ -42,8 +42,9 @@ pub(super) fn balanced_row(done: &Done) -> Row {
     let (mut force, mut moment, mut torque) = (0.0_f64, 0.0_f64, 0.0_f64);
     for sample in done.run.samples.iter().step_by(STRIDE) {
         let posture = sample.posture(hand);
-        let pulls = law.approach_wrenches(hand, &posture);
-        let turns = law.attitude_wrenches(hand, &posture, &latch);
+        let [force_n, stiffness_nm] = laws.gains().grasp;
+        let pulls = laws.grasp.approach_wrenches(hand, &posture, force_n);
+        let turns = laws.grasp.attitude_wrenches(hand, &posture, &latch.grasp, stiffness_nm);
         let (mut forces, mut moments, mut lengths) = (Vector3::zeros(), Vector3::zeros(), [0.0; 2]);
         let mut torques_nm: JointVector = [0.0; MAX_JOINTS];
         for i in 0..fingers {

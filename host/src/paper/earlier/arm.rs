@@ -6,8 +6,8 @@ use crate::paper::laws::{Law, Lost, built};
 use crate::record::sample::Sample;
 use crate::scene::Scene;
 use crate::scene::file::PushFile;
-use crate::sim::law;
-use blindgrasp_shared::control::Latch;
+use crate::sim::laws;
+use blindgrasp_shared::control::{Latch, Stance};
 use rayon::prelude::*;
 use serde::Serialize;
 
@@ -81,14 +81,15 @@ fn torques(scene: &Scene, samples: &[Sample]) -> Result<Vec<[f64; MAX_JOINTS]>, 
         run: RUN.to_owned(),
         cause: cause.into(),
     };
-    let law = law(scene).map_err(refused)?;
+    let laws = laws(scene).map_err(refused)?;
     let Some(first) = samples.first() else { return Ok(Vec::new()) };
     let latch = Latch::of(&first.posture(&scene.hand), &first.joint_angles_rad());
     let still = [0.0; MAX_JOINTS];
     let of = |sample: &Sample| {
         let (posture, angles_rad) = (sample.posture(&scene.hand), sample.joint_angles_rad());
-        let all = |grip| law.torques(&scene.hand, &posture, &angles_rad, &still, grip).0;
-        let (with, without) = (all(Some(law.grip(&latch))), all(None));
+        let stance = Stance { hand: &scene.hand, posture: &posture, angles_rad: &angles_rad };
+        let all = |grip| laws.torques(&stance, &still, grip).0;
+        let (with, without) = (all(Some(&laws.grip(&latch))), all(None));
         std::array::from_fn(|k| with[k] - without[k])
     };
     Ok(samples.iter().step_by(STRIDE).map(of).collect())

@@ -52,7 +52,7 @@ fn stiffness(paper: &Paper) -> Sentence {
 /// The simulation of Sec. 5.
 fn arm(paper: &Paper) -> Sentence {
     let [printed, stiff] = ["hand-arm", "hand-arm-stiff"].map(|name| paper.evidence.run(name).ok());
-    let gain = |done: &Done| number(done.scene.control.attitude_stiffness_nm);
+    let gain = |done: &Done| number(done.scene.control.attitude_stiffness_nm());
     let numbers = format!(
         "With the printed K_st of {}\u{a0}N\u{a0}m it is {}; with {}\u{a0}N\u{a0}m, {}.",
         gain(printed?),

@@ -11,9 +11,9 @@
 mod column;
 
 pub use crate::record::table::{Cell, Format, Kind};
-pub use column::{Column, NoSuchColumn};
+pub use column::{Column, NoSuchColumn, Row};
 
-use crate::record::mcap::{About, Decoded, Decoder, Entry, RecordingError, What};
+use crate::record::mcap::{About, Decoder, Entry, RecordingError, What};
 use crate::record::table::{self, Heading, TableError};
 use std::io::Write;
 use std::sync::mpsc::{self, Receiver, SendError, SyncSender};
@@ -73,14 +73,13 @@ pub enum ExportError {
 /// The columns of a table, and what their values are told by.
 struct Layout {
     columns: Vec<Column>,
-    start_ns: u64,
     joint_names: Vec<String>,
     /// For the metadata.
     about: Vec<(String, String)>,
 }
 
 impl table::Layout for Layout {
-    type Row = Decoded;
+    type Row = Row;
 
     fn row_name(&self) -> &str {
         "tick"
@@ -96,8 +95,8 @@ impl table::Layout for Layout {
     }
 
     #[inline]
-    fn cell<'a>(&'a self, row: &'a Decoded, column: usize) -> Cell<'a> {
-        self.columns[column].cell(row, self.start_ns, &self.joint_names)
+    fn cell<'a>(&'a self, row: &'a Row, column: usize) -> Cell<'a> {
+        self.columns[column].cell(row, &self.joint_names)
     }
 
     fn about(&self) -> Vec<(String, String)> {
@@ -109,7 +108,7 @@ impl table::Layout for Layout {
 enum Batch {
     /// Whose rows follow.
     About(Box<About>),
-    Rows(Vec<Decoded>),
+    Rows(Vec<Row>),
 }
 
 /// Exports entries of a recording. `each` is called now and then with the entries.
@@ -186,7 +185,8 @@ fn read<E: Iterator<Item = Result<Entry, RecordingError>>>(
             exported.lost += decoded.lost_before;
             exported.gaps += u64::from(decoded.lost_before > 0);
         }
-        rows.push(decoded);
+        let joint_count = about.as_ref().map_or(0, |about| about.joint_names.len());
+        rows.push(Row::of(decoded, request.start_ns, joint_count));
         if rows.len() == BATCH {
             each(entries);
             let full = std::mem::replace(&mut rows, Vec::with_capacity(BATCH));
@@ -222,8 +222,7 @@ fn write(
     let columns = Column::chosen(&about.joint_names, &request.signals)?;
     let joint_names = about.joint_names.clone();
     let about = metadata(&about, request);
-    let mut table =
-        table::create(format, to, Layout { columns, start_ns: request.start_ns, joint_names, about })?;
+    let mut table = table::create(format, to, Layout { columns, joint_names, about })?;
     for batch in batches {
         if let Batch::Rows(rows) = batch {
             table.write(&rows)?;

@@ -3,7 +3,7 @@
 use crate::MAX_JOINTS;
 use crate::scene::{HandFile, HandModel};
 use blindgrasp_shared::identity::Identity;
-use blindgrasp_shared::settings::{Each, Parameter};
+use blindgrasp_shared::parameters::Parameter;
 use blindgrasp_shared::tick::{Config, Params};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use serde_json::{Value, json};
@@ -130,21 +130,17 @@ impl Setting {
     /// All parameters of a controller.
     pub fn all<const J: usize, const F: usize>(params: &Params<J, F>) -> Vec<Self> {
         let joints = params.hand().joint_count();
-        let each = |&parameter: &Parameter| {
-            let count = match parameter.each() {
-                Each::Hand => 1,
-                Each::Joint => joints,
-                Each::Axis => 3,
-            };
-            (0..count.min(usize::from(u8::MAX))).map(move |index| (parameter, index as u8))
+        let each = |parameter: Parameter| (0..parameter.count(joints)).map(move |index| (parameter, index));
+        let value = |(parameter, index)| {
+            let value = params.get(parameter, index).ok().map(|setting| setting.value);
+            Self { parameter, index, value }
         };
-        let value = |(parameter, index)| Self { parameter, index, value: params.get(parameter, index).ok() };
-        Parameter::ALL.iter().flat_map(each).map(value).collect()
+        Parameter::ALL.into_iter().flat_map(each).map(value).collect()
     }
 
     /// Takes over the bandwidth of the estimator.
     pub(super) fn configure(&self, config: &mut Config<MAX_JOINTS>) {
-        if let (Parameter::EstimatorBandwidth, Some(value)) = (self.parameter, self.value) {
+        if let (Parameter::BANDWIDTH, Some(value)) = (self.parameter, self.value) {
             config.estimator.bandwidth_hz = value;
         }
     }
@@ -157,7 +153,7 @@ impl Setting {
         };
         let settings = settings.iter().map(|setting| {
             json!({
-                "key": setting.parameter.key(),
+                "key": setting.parameter.to_string(),
                 "index": setting.index,
                 "value": setting.value.map(value),
             })
@@ -178,7 +174,7 @@ impl Setting {
                 Value::String(word) => Some(word.parse().ok()?),
                 _ => return None,
             };
-            if let Some(&parameter) = Parameter::ALL.iter().find(|parameter| parameter.key() == key) {
+            if let Some(parameter) = Parameter::named(key) {
                 settings.push(Self { parameter, index, value });
             }
         }

@@ -2,10 +2,10 @@
 //! comes a thousand times a second; what is rare goes through `prost`.
 
 use super::decoder::Decoded;
-use super::schema::{joint, tick};
-use blindgrasp_shared::event::Event;
-use blindgrasp_shared::fault::Raised;
+use super::schema::JOINTS;
 use blindgrasp_shared::limit::Limit;
+use blindgrasp_shared::parameters::Each;
+use blindgrasp_shared::signals::Value;
 
 /// How much an event matters.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, prost::Enumeration)]
@@ -90,67 +90,75 @@ const EIGHT_BYTES: u32 = 1;
 const LENGTH: u32 = 2;
 const FOUR_BYTES: u32 = 5;
 
-/// Writes a tick into a buffer. `joint_names` are those that a fault names.
+/// Writes a tick into a buffer, in the order and with the numbers of [`tick_signals`](super::schema::tick_signals).
+/// `joint_names` are those that a fault names.
 pub(super) fn write_tick(decoded: &Decoded, joint_names: &[String], buffer: &mut Vec<u8>) {
-    let record = &decoded.record;
-    whole(buffer, tick::SEQUENCE, record.sequence.into());
-    whole(buffer, tick::TICK, record.tick.into());
-    double(buffer, tick::TIME_S, decoded.time_s);
-    whole(buffer, tick::MODE, record.mode as u64);
-    raised(buffer, [tick::FAULT, tick::FAULT_JOINT], record.fault, joint_names);
-    raised(buffer, [tick::READING_FAILED, tick::READING_JOINT], record.reading_failed, joint_names);
-    let events = [Event::Heartbeat, Event::Late, Event::FallbackClock];
-    for (event, number) in events.into_iter().zip([tick::HEARTBEAT, tick::LATE, tick::FALLBACK_CLOCK]) {
-        whole(buffer, number, record.events.contains(event).into());
-    }
-    float(buffer, tick::FORCE_N, record.force_n);
-    float(buffer, tick::STIFFNESS_NM, record.attitude_stiffness_nm);
-    float(buffer, tick::APPROACH_J, record.approach_potential_j);
-    float(buffer, tick::ATTITUDE_J, record.attitude_potential_j);
-    whole(buffer, tick::CYCLES, record.cycles.into());
-    whole(buffer, tick::LATE_TICKS, record.late_ticks.into());
-    whole(buffer, tick::DROPPED, record.dropped.into());
-    whole(buffer, tick::DECIMATION, decoded.decimation().into());
-    whole(buffer, tick::LOST_BEFORE, decoded.lost_before);
-    nested(buffer, tick::JOINTS, |buffer| {
+    let mut of_joints = Vec::with_capacity(4);
+    let mut number = JOINTS;
+    let mut next = || {
+        number += 1;
+        number
+    };
+    double(buffer, next(), decoded.time_s);
+    whole(buffer, next(), decoded.lost_before);
+    decoded.record.tell(|told| match told.each {
+        Each::Joint => of_joints.push(told.value),
+        Each::Hand | Each::Axis => write_value(buffer, next(), told.value, joint_names),
+    });
+    nested(buffer, JOINTS, |buffer| {
         for (k, _) in joint_names.iter().enumerate() {
-            nested(buffer, k as u32 + 1, |buffer| write_joint(decoded, k, buffer));
+            nested(buffer, k as u32 + 1, |buffer| write_joint(decoded, &of_joints, k, buffer));
         }
     });
-    float(buffer, tick::INTEGRAL_NM_RAD, record.integral_gain_nm_rad);
-    float(buffer, tick::INTEGRAL_J, record.integral_potential_j);
-    float(buffer, tick::WORK_J, record.work_j);
-    float(buffer, tick::DAMPED_J, record.damped_j);
-    float(buffer, tick::EXCESS_J, record.excess_j);
 }
 
-fn write_joint(decoded: &Decoded, k: usize, buffer: &mut Vec<u8>) {
-    let record = &decoded.record;
-    if let Some(&count) = record.counts.as_slice().get(k) {
-        key(buffer, joint::COUNT, VARINT);
-        // Small numbers of either sign in few bytes.
-        varint(buffer, u64::from((count.wrapping_shl(1) ^ (count >> 31)) as u32));
-    }
+fn write_joint(decoded: &Decoded, told: &[Value<'_>], k: usize, buffer: &mut Vec<u8>) {
     let known = |values: &[f32]| values.get(k).copied().unwrap_or(f32::NAN);
-    float(buffer, joint::ANGLE_RAD, known(decoded.angles_rad.as_slice()));
-    float(buffer, joint::SPEED_RAD_S, known(decoded.speeds_rad_s.as_slice()));
-    float(buffer, joint::TORQUE_NM, known(record.torques_nm.as_slice()));
-    if let Some(limiting) = record.limiting.as_slice().get(k).filter(|limiting| !limiting.is_empty()) {
-        let numbers = [joint::BY_TORQUE, joint::BY_SLEW, joint::BY_LOWER_STOP, joint::BY_UPPER_STOP];
-        for (limit, number) in Limit::ALL.into_iter().zip(numbers) {
-            whole(buffer, number, limiting.contains(limit).into());
+    float(buffer, 1, known(decoded.angles_rad.as_slice()));
+    float(buffer, 2, known(decoded.speeds_rad_s.as_slice()));
+    let mut number = 2;
+    for value in told {
+        number += 1;
+        match (value.of_joint(k), value) {
+            (Value::Missing, Value::Reals(_)) => float(buffer, number, f32::NAN),
+            (Value::Limiting(limiting), _) => {
+                for (limit, number) in Limit::ALL.into_iter().zip(number..) {
+                    whole(buffer, number, limiting.contains(limit).into());
+                }
+                number += Limit::ALL.len() as u32 - 1;
+            }
+            (value, _) => write_value(buffer, number, value, &[]),
         }
     }
 }
 
-fn raised(buffer: &mut Vec<u8>, [fault, joint]: [u32; 2], raised: Option<Raised>, joint_names: &[String]) {
-    let Some(raised) = raised else { return };
-    whole(buffer, fault, raised.fault.number().into());
-    if let Some(name) = raised.joint.and_then(|k| joint_names.get(usize::from(k))) {
-        key(buffer, joint, LENGTH);
-        varint(buffer, name.len() as u64);
-        buffer.extend_from_slice(name.as_bytes());
+fn write_value(buffer: &mut Vec<u8>, number: u32, value: Value<'_>, joint_names: &[String]) {
+    match value {
+        Value::Missing | Value::Counts(_) | Value::Reals(_) | Value::Limits(_) => {}
+        Value::Whole(value) => whole(buffer, number, value.into()),
+        Value::Count(count) => {
+            key(buffer, number, VARINT);
+            // Small numbers of either sign in few bytes.
+            varint(buffer, u64::from((count.wrapping_shl(1) ^ (count >> 31)) as u32));
+        }
+        Value::Real(value) => float(buffer, number, value),
+        Value::Truth(value) => whole(buffer, number, value.into()),
+        Value::Mode(mode) => whole(buffer, number, mode as u64),
+        Value::Fault(fault) => whole(buffer, number, fault.number().into()),
+        Value::Joint(joint) => {
+            if let Some(name) = joint_names.get(usize::from(joint)) {
+                text(buffer, number, name);
+            }
+        }
+        Value::Answer(answer) => text(buffer, number, &answer.to_string()),
+        Value::Limiting(limiting) => text(buffer, number, &limiting.to_string()),
     }
+}
+
+fn text(buffer: &mut Vec<u8>, number: u32, text: &str) {
+    key(buffer, number, LENGTH);
+    varint(buffer, text.len() as u64);
+    buffer.extend_from_slice(text.as_bytes());
 }
 
 /// A message in a message. Its length stands before it: a byte if it is short, as a joint's always is; otherwise the

@@ -1,9 +1,15 @@
 //! The schemas of the decoded channels: protobuf descriptors made for a hand, JSON schemas, and the signal table.
 //!
-//! One table lists every signal with its number in the message, its type, unit, words and resolution; descriptors,
-//! signal table and, by the numbers, the encoding follow from it.
+//! The fields of a tick are those of the tables of signals, in their order: [`tick_signals`] numbers them, for the
+//! descriptors, the signal table and the encoding.
 
+use crate::record::derived::Derived;
+use crate::wire::Record;
+use blindgrasp_shared::control::Signal;
 use blindgrasp_shared::fault::Fault;
+use blindgrasp_shared::limit::Limit;
+use blindgrasp_shared::parameters::Each;
+use blindgrasp_shared::signals::Kind;
 use blindgrasp_shared::supervisor::Mode;
 use prost::Message;
 use prost_types::field_descriptor_proto::{Label, Type};
@@ -18,98 +24,110 @@ pub(super) const LOG: &str = "foxglove.Log";
 /// Name of the schema of the link's state.
 pub(super) const LINK: &str = "blindgrasp.Link";
 
-/// A signal: a field of a message.
-pub(super) struct Signal {
+/// Number of the field of a tick that holds the joints.
+pub(super) const JOINTS: u32 = 1;
+
+/// A signal of a tick: a field of its message, or of a joint's.
+pub(super) struct TickSignal {
+    pub(super) number: u32,
+    pub(super) name: String,
+    pub(super) each: Each,
+    pub(super) kind: FieldKind,
+    unit: &'static str,
+    words: &'static str,
+}
+
+/// The type of a field.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum FieldKind {
+    /// Derived by the host.
+    Derived(Derived),
+    /// Told by the hand.
+    Told(Kind),
+    /// One of the limits of a torque.
+    Limit(Limit),
+}
+
+impl FieldKind {
+    const fn proto(self) -> Type {
+        match self {
+            Self::Derived(Derived::Time | Derived::HostTime) => Type::Double,
+            Self::Derived(Derived::LostBefore) => Type::Uint64,
+            Self::Derived(Derived::Angle | Derived::Speed) | Self::Told(Kind::Real) => Type::Float,
+            Self::Told(Kind::Whole) => Type::Uint32,
+            Self::Told(Kind::Count) => Type::Sint32,
+            Self::Told(Kind::Truth) | Self::Limit(_) => Type::Bool,
+            Self::Told(Kind::Mode | Kind::Fault) => Type::Enum,
+            Self::Told(Kind::Joint | Kind::Answer | Kind::Limiting) => Type::String,
+        }
+    }
+}
+
+/// The signals of a tick in the order in which they are written: the host's, and then the hand's. Those of a joint are
+/// numbered by themselves. What a limit does has a field for each limit; a host's time has none, since every message has it.
+pub(super) fn tick_signals() -> Vec<TickSignal> {
+    let mut signals: Vec<TickSignal> = Vec::new();
+    let mut next = [JOINTS + 1, 1];
+    let mut add = |name: String, each: Each, kind, unit, words| {
+        let next = &mut next[usize::from(each == Each::Joint)];
+        signals.push(TickSignal { number: *next, name, each, kind, unit, words });
+        *next += 1;
+    };
+    for &derived in Derived::ALL.iter().filter(|&&derived| derived != Derived::HostTime) {
+        let kind = FieldKind::Derived(derived);
+        add(derived.key().into(), derived.each(), kind, derived.unit(), derived.words());
+    }
+    Record::BLANK.tell(|told| {
+        let Signal { key, unit, words } = told.signal;
+        if told.kind == Kind::Limiting {
+            for limit in Limit::ALL {
+                let name = format!("{key}_{}", limit.key());
+                add(name, told.each, FieldKind::Limit(limit), unit, limit.words());
+            }
+        } else {
+            add(key.into(), told.each, FieldKind::Told(told.kind), unit, words);
+        }
+    });
+    signals
+}
+
+/// A signal of the link: a field of a message.
+pub(super) struct LinkSignal {
     pub(super) number: u32,
     pub(super) name: &'static str,
     kind: Type,
     unit: &'static str,
     words: &'static str,
-    resolution: &'static str,
 }
 
 macro_rules! signals {
-    ($(#[$doc:meta])* $module:ident: $($constant:ident = $number:literal, $name:literal, $kind:ident, $unit:literal, $words:literal, $resolution:ident;)*) => {
+    ($(#[$doc:meta])* $module:ident: $($constant:ident = $number:literal, $name:literal, $kind:ident, $unit:literal, $words:literal;)*) => {
         $(#[$doc])*
         pub(super) mod $module {
-            use super::{Signal, Type};
+            use super::{LinkSignal, Type};
             $(pub(in super::super) const $constant: u32 = $number;)*
-            pub(in super::super) const ALL: &[Signal] = &[$(Signal {
-                number: $constant, name: $name, kind: Type::$kind, unit: $unit, words: $words, resolution: super::$resolution,
+            pub(in super::super) const ALL: &[LinkSignal] = &[$(LinkSignal {
+                number: $constant, name: $name, kind: Type::$kind, unit: $unit, words: $words,
             }),*];
         }
     };
-}
-
-const EXACT: &str = "exact";
-const TICK: &str = "a tick";
-const CYCLES: &str = "4 in dense records, 1 in full ones";
-const FRACTION: &str = "a fraction of a count";
-const ESTIMATOR: &str = "see shared/src/estimate.rs";
-const NOTHING: &str = "";
-const HALF: &str = "11 significant bits (IEEE 754 binary16) in dense records, exact in full ones";
-
-#[rustfmt::skip]
-signals! {
-    /// Of a tick. Number 16 was that of a signal which is no more.
-    tick:
-    SEQUENCE            =  1, "sequence",             Uint32, "",       "Number of the record, one more from record to record, modulo 2^32", EXACT;
-    TICK                =  2, "tick",                 Uint32, "",       "Number of the tick since the device's start, modulo 2^32", EXACT;
-    TIME_S              =  3, "time_s",               Double, "s",      "Time of the tick since the device's start, on the device's clock", TICK;
-    MODE                =  4, "mode",                 Enum,   "",       "Mode; its name is the word", EXACT;
-    FAULT               =  5, "fault",                Enum,   "",       "The fault that the hand is in; its name is the word, its value the number", EXACT;
-    FAULT_JOINT         =  6, "fault_joint",          String, "",       "The joint of the fault, if it is one's", EXACT;
-    READING_FAILED      =  7, "reading_failed",       Enum,   "",       "Why there are no counts, where the joints could not be read", EXACT;
-    READING_JOINT       =  8, "reading_failed_joint", String, "",       "The joint that could not be read", EXACT;
-    HEARTBEAT           =  9, "heartbeat",            Bool,   "",       "Whether a heartbeat of the host came in this tick", EXACT;
-    LATE                = 10, "late",                 Bool,   "",       "Whether the tick before was late", EXACT;
-    FALLBACK_CLOCK      = 11, "fallback_clock",       Bool,   "",       "Whether the clock is not the crystal", EXACT;
-    FORCE_N             = 12, "force_n",              Float,  "N",      "Force f_d that acts", HALF;
-    STIFFNESS_NM        = 13, "attitude_stiffness_nm", Float, "N m",    "Attitude stiffness K_st that acts", HALF;
-    APPROACH_J          = 14, "approach_potential_j", Float,  "J",      "Potential V_s of the approach", HALF;
-    ATTITUDE_J          = 15, "attitude_potential_j", Float,  "J",      "Potential V_st of the attitudes, above its least value", HALF;
-    CYCLES              = 17, "cycles",               Uint32, "cycles", "Processor cycles of reading and writing the joints in the tick before; 0 where nothing counts them", CYCLES;
-    LATE_TICKS          = 18, "late_ticks",           Uint32, "",       "Ticks that were late since the start", EXACT;
-    DROPPED             = 19, "dropped",              Uint32, "",       "Records and answers that the device lost since its start because a queue was full", EXACT;
-    DECIMATION          = 20, "decimation",           Uint32, "ticks",  "Ticks from one sent record to the next", EXACT;
-    LOST_BEFORE         = 21, "lost_before",          Uint64, "",       "Records missing between the one before and this one", EXACT;
-    JOINTS              = 22, "joints",               Message, "",      "The joints by name", NOTHING;
-    INTEGRAL_NM_RAD     = 23, "integral_gain_nm_rad", Float,  "N m/rad", "Gain K_I of the earlier law that acts", HALF;
-    INTEGRAL_J          = 24, "integral_potential_j", Float,  "J",      "Potential V_I of the joints' turns since the grasp began", HALF;
-    WORK_J              = 25, "work_j",               Float,  "J",      "Work of the motors since the last grasp began", HALF;
-    DAMPED_J            = 26, "damped_j",             Float,  "J",      "What the law's damping has taken since the last grasp began", HALF;
-    EXCESS_J            = 27, "excess_j",             Float,  "J",      "Work of the motors in the last second (fading) beyond the drop of the law's potentials", HALF;
-}
-
-#[rustfmt::skip]
-signals! {
-    /// Of a joint.
-    joint:
-    COUNT               =  1, "count",                Sint32, "counts", "Encoder count; absent where it is not known", EXACT;
-    ANGLE_RAD           =  2, "angle_rad",            Float,  "rad",    "Angle as the controller's estimator sees it; NaN where it is not known", FRACTION;
-    SPEED_RAD_S         =  3, "speed_rad_s",          Float,  "rad/s",  "Speed as the controller's estimator sees it; NaN where it is not known", ESTIMATOR;
-    TORQUE_NM           =  4, "torque_nm",            Float,  "N m",    "Torque of the next tick; NaN where it is not known", HALF;
-    BY_TORQUE           =  5, "limited_by_torque",    Bool,   "",       "Whether the torque limit acts", EXACT;
-    BY_SLEW             =  6, "limited_by_slew",      Bool,   "",       "Whether the slew limit acts", EXACT;
-    BY_LOWER_STOP       =  7, "limited_by_lower_stop", Bool,  "",       "Whether the lower end stop acts", EXACT;
-    BY_UPPER_STOP       =  8, "limited_by_upper_stop", Bool,  "",       "Whether the upper end stop acts", EXACT;
 }
 
 #[rustfmt::skip]
 signals! {
     /// Of the link.
     link:
-    SECONDS             =  1, "seconds_s",            Double, "s",      "Time that this tells of", EXACT;
-    BYTES               =  2, "bytes",                Uint64, "bytes",  "Bytes of the good frames that came", EXACT;
-    FRAMES              =  3, "frames",               Uint64, "",       "Good frames that came", EXACT;
-    DAMAGED             =  4, "damaged",              Uint64, "",       "Frames that came damaged, each of which may have been a record", EXACT;
-    RECORDS             =  5, "records",              Uint64, "",       "Records that came and could be decoded", EXACT;
-    MISSING             =  6, "missing",              Uint64, "",       "Records that are missing, by the numbers of those that came", EXACT;
-    DROPPED             =  7, "dropped",              Uint64, "",       "Records and answers that the device lost because a queue was full", EXACT;
-    UNUSABLE            =  8, "unusable",             Uint64, "",       "Frames that came whole and can't be decoded; of records, those until a full one comes (among the missing)", EXACT;
-    RATE_HZ             =  9, "rate_hz",              Double, "1/s",    "Decoded records a second", EXACT;
-    DECIMATION          = 10, "decimation",           Uint32, "ticks",  "Ticks from one sent record to the next, as the device told last", EXACT;
-    SHARE               = 11, "share",                Double, "1",      "Share of the line's time that the frames took; NaN where its speed is not known", EXACT;
+    SECONDS             =  1, "seconds_s",            Double, "s",      "Time that this tells of";
+    BYTES               =  2, "bytes",                Uint64, "bytes",  "Bytes of the good frames that came";
+    FRAMES              =  3, "frames",               Uint64, "",       "Good frames that came";
+    DAMAGED             =  4, "damaged",              Uint64, "",       "Frames that came damaged, each of which may have been a record";
+    RECORDS             =  5, "records",              Uint64, "",       "Records that came and could be decoded";
+    MISSING             =  6, "missing",              Uint64, "",       "Records that are missing, by the numbers of those that came";
+    DROPPED             =  7, "dropped",              Uint64, "",       "Records and answers that the device lost because a queue was full";
+    UNUSABLE            =  8, "unusable",             Uint64, "",       "Frames that came whole and can't be decoded; of records, those until a full one comes (among the missing)";
+    RATE_HZ             =  9, "rate_hz",              Double, "1/s",    "Decoded records a second";
+    DECIMATION          = 10, "decimation",           Uint32, "ticks",  "Ticks from one sent record to the next, as the device told last";
+    SHARE               = 11, "share",                Double, "1",      "Share of the line's time that the frames took; NaN where its speed is not known";
 }
 
 /// A name that protobuf takes for a field: letters, digits, underscores.
@@ -142,15 +160,23 @@ pub(super) fn joint_fields(names: &[String]) -> Vec<String> {
 pub(super) fn of_hand(hand: &str, joint_names: &[String]) -> (String, Vec<u8>) {
     let package = format!("blindgrasp.{}", identifier(hand).to_lowercase());
     let full = |name: &str| format!(".{package}.Tick.{name}");
-    let mut tick_fields = fields(tick::ALL);
-    for (name, kind) in
-        [("mode", "Mode"), ("fault", "Fault"), ("reading_failed", "Fault"), ("joints", "Joints")]
-    {
-        for field in tick_fields.iter_mut().filter(|field| field.name() == name) {
-            field.type_name = Some(full(kind));
-        }
-    }
-    let joint_message = message("Joint", fields(joint::ALL));
+    let typed = |signal: &TickSignal| {
+        let name = match signal.kind {
+            FieldKind::Told(Kind::Mode) => Some("Mode"),
+            FieldKind::Told(Kind::Fault) => Some("Fault"),
+            _ => None,
+        };
+        let field = field(&signal.name, signal.number as i32, signal.kind.proto());
+        FieldDescriptorProto { type_name: name.map(full), ..field }
+    };
+    let signals = tick_signals();
+    let of = |each| signals.iter().filter(move |signal| signal.each == each).map(typed).collect::<Vec<_>>();
+    let mut tick_fields = of(Each::Hand);
+    tick_fields.push(FieldDescriptorProto {
+        type_name: Some(full("Joints")),
+        ..field("joints", JOINTS as i32, Type::Message)
+    });
+    let joint_message = message("Joint", of(Each::Joint));
     let of_joints = joint_fields(joint_names).into_iter().zip(1..);
     let joints = of_joints
         .map(|(name, number)| FieldDescriptorProto {
@@ -268,25 +294,17 @@ pub(super) fn of_parameters() -> Value {
 
 /// The table of all signals.
 pub(super) fn signal_table() -> Value {
-    let rows = |signals: &[Signal], path: &str| -> Vec<Value> {
-        let row = |signal: &Signal| {
-            json!({
-                "name": format!("{path}{}", signal.name),
-                "unit": signal.unit,
-                "words": signal.words,
-                "resolution": signal.resolution,
-            })
-        };
-        signals.iter().filter(|signal| signal.kind != Type::Message).map(row).collect()
-    };
-    let of_tick = [rows(tick::ALL, ""), rows(joint::ALL, "joints.<joint>.")].concat();
-    json!({
-        "tick": of_tick,
-        "link": rows(link::ALL, ""),
-    })
+    let row = |name: &str, unit: &str, words: &str| json!({ "name": name, "unit": unit, "words": words });
+    let signals = tick_signals();
+    let of_tick = signals.iter().map(|signal| {
+        let path = if signal.each == Each::Joint { "joints.<joint>." } else { "" };
+        row(&format!("{path}{}", signal.name), signal.unit, signal.words)
+    });
+    let of_link = link::ALL.iter().map(|signal| row(signal.name, signal.unit, signal.words));
+    json!({ "tick": of_tick.collect::<Vec<_>>(), "link": of_link.collect::<Vec<_>>() })
 }
 
-fn fields(signals: &[Signal]) -> Vec<FieldDescriptorProto> {
+fn fields(signals: &[LinkSignal]) -> Vec<FieldDescriptorProto> {
     signals.iter().map(|signal| field(signal.name, signal.number as i32, signal.kind)).collect()
 }
 

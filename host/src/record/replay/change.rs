@@ -3,7 +3,7 @@
 use crate::MAX_JOINTS;
 use crate::scene::suggestion;
 use blindgrasp_shared::command::Refusal;
-use blindgrasp_shared::settings::{Each, Parameter};
+use blindgrasp_shared::parameters::{Each, Parameter};
 use blindgrasp_shared::tick::Config;
 use std::str::FromStr;
 
@@ -49,8 +49,9 @@ impl FromStr for Change {
             return fail("no value".into(), "write KEY=VALUE".into());
         };
         let Some((parameter, rest)) = parameter(key) else {
-            let keys = Parameter::ALL.iter().map(|parameter| parameter.key());
+            let keys = Parameter::ALL.map(|parameter| parameter.to_string());
             let bare = key.split('[').next().unwrap_or(key);
+            let keys = keys.iter().map(String::as_str);
             return fail(format!("`{key}` is no parameter"), suggestion(bare, keys));
         };
         let which = match rest.strip_prefix('.') {
@@ -77,8 +78,8 @@ impl FromStr for Change {
 
 /// The parameter that a key begins with, and the rest of the key.
 fn parameter(key: &str) -> Option<(Parameter, &str)> {
-    Parameter::ALL.iter().find_map(|&parameter| {
-        let rest = key.strip_prefix(parameter.key())?;
+    Parameter::ALL.into_iter().find_map(|parameter| {
+        let rest = key.strip_prefix(&parameter.to_string())?;
         (rest.is_empty() || rest.starts_with(['.', '['])).then_some((parameter, rest))
     })
 }
@@ -86,7 +87,7 @@ fn parameter(key: &str) -> Option<(Parameter, &str)> {
 impl Change {
     /// Whether it acts only on grasps that begin after it.
     pub(super) fn is_of_the_grasp(&self) -> bool {
-        matches!(self.parameter, Parameter::Force | Parameter::AttitudeStiffness | Parameter::IntegralGain)
+        self.parameter.is_gain()
     }
 
     /// Puts it into a configuration, without looking at the others.
@@ -124,7 +125,7 @@ impl Change {
                 Err(Refusal::OutOfRange) if self.value.is_none() => {
                     return fail("it can't be switched off".into(), "give it a value".into());
                 }
-                Err(refusal) => return fail(refusal.words().into(), self.parameter.words().into()),
+                Err(refusal) => return fail(refusal.words().into(), self.parameter.words().to_string()),
             }
         }
         Ok(())
@@ -150,14 +151,14 @@ mod tests {
     fn one_joint_by_number_or_name_or_all() {
         let before = changed(&[]).unwrap();
         let config = changed(&["damping_nm_s = 0.25"]).unwrap();
-        assert_eq!(config.law.damping_nm_s[..12], [0.25; 12]);
-        assert_eq!(config.law.damping_nm_s[12..], [0.0; 12]);
+        assert_eq!(config.laws.hold.damping_nm_s[..12], [0.25; 12]);
+        assert_eq!(config.laws.hold.damping_nm_s[12..], [0.0; 12]);
         let config = changed(&["limits.torque_nm[1]=0.5", "limits.torque_nm.finger-1-abduct=0.75"]).unwrap();
         let (limits, others) = (config.limits.torque_nm.unwrap(), before.limits.torque_nm.unwrap());
         assert_eq!(limits[..2], [0.75, 0.5]);
         assert_eq!(limits[2..], others[2..]);
         let config = changed(&["gravity_m_s2.x=1", "gravity_m_s2[1]=2"]).unwrap();
-        assert_eq!(config.law.gravity_m_s2.unwrap().as_slice()[..2], [1.0, 2.0]);
+        assert_eq!(config.laws.hold.gravity_m_s2.unwrap().as_slice()[..2], [1.0, 2.0]);
         assert_eq!(changed(&["limits.slew_nm_s=off"]).unwrap().limits.slew_nm_s, None);
         assert_eq!(changed(&["faults.heartbeat_ms=100"]).unwrap().faults.heartbeat_ms, Some(100));
     }

@@ -259,7 +259,7 @@ impl Follower {
     fn ask(&mut self, sequence: u16, setting: Setting) {
         let known = self.controller.as_ref();
         let now = known.and_then(|known| known.recorded.get(setting.parameter, setting.index).ok());
-        if now != setting.value {
+        if now.map(|now| now.value) != setting.value {
             self.asked.push((sequence, setting));
         }
     }

@@ -31,7 +31,7 @@ pub use report::{JointChange, LimitShare, OpenLoop, Raising, Report};
 use crate::record::mcap::{Entry, RecordingError};
 use crate::scene::{HandModel, SceneError};
 use blindgrasp_shared::parameter::ParameterError;
-use blindgrasp_shared::settings::Parameter;
+use blindgrasp_shared::parameters::Parameter;
 use blindgrasp_shared::telemetry::INTERFACE_VERSION;
 use serde::Serialize;
 use std::fmt;

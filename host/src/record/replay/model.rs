@@ -100,14 +100,15 @@ mod tests {
             period_us: 1000,
         };
         let (clock, reset) = (Clock::External, ResetCause::PowerOn);
-        let about = About::of(&Identity { image, units: UNITS, clock, reset, crash: None }).with_hand(&file);
+        let about = About::of(&Identity { image, units: UNITS, clock, reset, crash: None, changed: 0 })
+            .with_hand(&file);
         let recorded = Model::new(&about, None).unwrap();
         let mut configs = vec![model.config];
         // Everything that can be switched is on in the hand's file: off, in turns.
         let change = |change: fn(&mut Config<MAX_JOINTS>)| {
             let mut config = model.config;
-            config.law.force_n = 4.0;
-            config.law.damping_nm_s[7] = 0.125;
+            config.laws.gains.grasp[0] = 4.0;
+            config.laws.hold.damping_nm_s[7] = 0.125;
             config.faults.heartbeat_ms = Some(77);
             change(&mut config);
             config
@@ -115,7 +116,7 @@ mod tests {
         configs.push(change(|_| {}));
         configs.push(change(|config| config.limits = LimitConfig::NONE));
         configs.push(change(|config| config.faults = FaultConfig::LEAST));
-        configs.push(change(|config| config.law.gravity_m_s2 = None));
+        configs.push(change(|config| config.laws.hold.gravity_m_s2 = None));
         for config in &configs {
             let settings = Setting::all(&recorded.params(config).unwrap());
             for before in [None, Some(&configs[2]), Some(&configs[3])] {

@@ -75,11 +75,10 @@ fn a_hand_can_have_the_earlier_law() {
     let model = HandModel::load(path.to_str().unwrap());
     std::fs::remove_dir_all(&folder).unwrap();
     let model = model.unwrap();
-    let (law, limits) = (&model.config.law, &model.config.limits);
-    assert_eq!((law.attitude_stiffness_nm, law.integral_gain_nm_rad), (0.0, 0.02));
+    let (gains, limits) = (&model.config.laws.gains, &model.config.limits.gains);
+    assert_eq!((gains.grasp[1], gains.integral), (0.0, [0.02]));
     // Four times as firmly, if a user asks for it: as with the paper's gains.
-    assert_eq!((limits.attitude_stiffness_nm, limits.integral_gain_nm_rad), (Some(0.0), Some(0.08)));
-    assert!(model.source().contains("integral_gain_nm_rad: 0.02,"), "{}", model.source());
+    assert_eq!((limits.grasp[1], limits.integral), (Some(0.0), [Some(0.08)]));
 }
 
 #[test]
@@ -149,7 +148,7 @@ fn gains_of_the_hand_do_not_act_in_a_scene() {
     let error = load("cube", &["hand.control.force_n=3"]).unwrap_err().to_string();
     assert_eq!(error, "--set: hand.control.force_n: acts in the firmware only; set control.force_n");
     let scene = load("cube", &["control.force_n=3"]).unwrap();
-    assert_eq!(scene.controller_config().law.force_n, 3.0);
+    assert_eq!(scene.controller_config().laws.gains.grasp[0], 3.0);
     // But what the firmware of its hand is, a scene still knows.
     assert_eq!(HandModel::of(&scene).unwrap(), HandModel::load("three-finger").unwrap());
 }

@@ -126,7 +126,8 @@ fn equilibrium_indentation_is_that_of_eq_57() {
         let centres = centres(&scene);
         let middle = centres.iter().sum::<Vector3<f64>>() / 3.0;
         for (i, contact) in scene.contacts.iter().enumerate() {
-            let desired = scene.control.force_n / 0.045 * contact.frame.column(1).dot(&(middle - centres[i]));
+            let desired =
+                scene.control.force_n() / 0.045 * contact.frame.column(1).dot(&(middle - centres[i]));
             let force = scene.fingertips[i].stiffness_n_m2 * scene.start.indentations_m[i].powi(2);
             assert!((force / desired - 1.0).abs() < 1e-9, "{force} {desired}");
         }
@@ -186,7 +187,7 @@ fn settings_reach_everything() {
         ],
     )
     .unwrap();
-    assert_eq!(scene.control.force_n, 4.0);
+    assert_eq!(scene.control.force_n(), 4.0);
     assert_eq!(scene.substeps, 20);
     assert_eq!(scene.hand.link(1).mass_kg, 0.02);
     assert_eq!(scene.hand.range_rad(11), (-0.1, 1.5));

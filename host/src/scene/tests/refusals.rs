@@ -288,9 +288,9 @@ fn scenes_built_in_code_refuse_numbers_that_are_none() {
     let good = load("cube", &[]).unwrap().file;
     let fields: &[fn(&mut SceneFile) -> &mut f64] = &[
         |s| &mut s.duration_s,
-        |s| &mut s.control.force_n,
-        |s| &mut s.control.attitude_stiffness_nm,
-        |s| &mut s.control.integral_gain_nm_rad,
+        |s| &mut s.control.gains.grasp[0],
+        |s| &mut s.control.gains.grasp[1],
+        |s| &mut s.control.gains.integral[0],
         |s| &mut s.control.damping_scale,
         |s| &mut s.control.period_s,
         |s| &mut s.control.soft_start_s,

@@ -29,7 +29,7 @@ fn runs_are_the_grid_with_the_last_axis_fastest() {
     for run in 0..24 {
         let Ok(file) = plan.file(run) else { continue };
         let place = plan.place(run);
-        assert_eq!(file.control.force_n, [4.0, 5.0][place[0]]);
+        assert_eq!(file.control.force_n(), [4.0, 5.0][place[0]]);
         assert_eq!(file.object.name, ["cube", "prism"][place[1]]);
         assert_eq!(file.friction.scale, [0.0, 0.5, 1.0][place[2]]);
         assert_eq!(file.seed, 1 + run as u32 % 2);

@@ -32,9 +32,9 @@ pub(in super::super) fn control(specimen: &Specimen, found: &mut Found) {
         found.push(tell(Severity::Warning, "damping_scale", what, "give a positive factor"));
     }
     if found.trusts(&["offset_m", "axis", "rotation_rpy_rad", "torque_limit_nm", "radius_m", "force_n"]) {
-        force(specimen, control.force_n, control.gravity_compensation, found, &tell);
+        force(specimen, control.force_n(), control.gravity_compensation, found, &tell);
         let (stiffness, bound) =
-            (control.attitude_stiffness_nm, strength::stiffness_bound_nm(specimen, control.force_n));
+            (control.attitude_stiffness_nm(), strength::stiffness_bound_nm(specimen, control.force_n()));
         if stiffness > bound && found.trusts(&["attitude_stiffness_nm"]) {
             let what = format!(
                 "K_st of {stiffness} N m is more than the {bound:.2e} N m that Eq. 49 allows with this f_d at the nominal posture"

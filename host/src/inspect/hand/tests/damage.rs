@@ -26,7 +26,7 @@ const VALUES: [f64; 16] = [
 fn numbers(file: &mut HandFile) -> Vec<&mut f64> {
     let mut all = Vec::new();
     if let Some(control) = &mut file.control {
-        all.extend([&mut control.force_n, &mut control.attitude_stiffness_nm, &mut control.damping_scale]);
+        all.extend(control.gains.grasp.iter_mut().chain([&mut control.damping_scale]));
         all.extend([&mut control.period_s, &mut control.soft_start_s, &mut control.estimator_bandwidth_hz]);
     }
     for joint in &mut file.joints {

@@ -40,7 +40,7 @@ fn gains_of_the_paper_s_hand_are_those_of_table_vii() {
     let (folder, starter) = start(&original.to_urdf(), |_| ()).unwrap();
     let hand = read(&folder, &starter);
     let control = hand.control.as_ref().unwrap();
-    assert_eq!((control.force_n, control.attitude_stiffness_nm), (5.0, 5e-3));
+    assert_eq!((control.force_n(), control.attitude_stiffness_nm()), (5.0, 5e-3));
     for (ours, theirs) in hand.fingertips.iter().zip(&original.fingertips) {
         assert_eq!(ours.radius_m, theirs.radius_m);
         // 8 % of the radius under 5 N; the paper's is indented by 9.6 %.
@@ -125,7 +125,7 @@ fn placeholders_are_replaced_by_guesses() {
 fn a_force_beyond_the_finger_s_weight_is_asked_about() {
     let urdf = GRIPPER.replace("effort=\"1.2\"", "effort=\"12\"").replace("effort=\"0.8\"", "effort=\"8\"");
     let (folder, starter) = start(&urdf, |request| request.base = Some("palm".into())).unwrap();
-    let force_n = read(&folder, &starter).control.unwrap().force_n;
+    let force_n = read(&folder, &starter).control.unwrap().force_n();
     assert_eq!(force_n, 7.4); // (0.08 + 0.07) / 2 kg * 9.81 m/s^2 * 10
     assert!(
         starter.guesses[3]

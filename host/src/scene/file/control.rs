@@ -1,0 +1,127 @@
+//! `[control]`: the gains of the laws, which the laws themselves declare, and what surrounds them.
+
+use blindgrasp_shared::control::{Chosen, GAINS, LAWS, PerGain};
+use serde::de::{self, Error as _, MapAccess, Visitor};
+use serde::ser::SerializeMap;
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
+use std::fmt;
+use std::sync::LazyLock;
+
+/// Writes the struct, and how it is read and written, from one line a key.
+macro_rules! control {
+    ($($(#[$doc:meta])* $field:ident: $type:ty = $default:expr;)*) => {
+        /// The controller: laws, their gains, and what surrounds them. The damping gains are the hand's.
+        #[derive(Clone, Debug, PartialEq)]
+        pub struct Control {
+            /// Gains in full, by the keys that their laws declare. Those of the paper's law have to be given; others are zero
+            /// if they are not.
+            pub gains: PerGain<f64>,
+            /// The laws that may act. A law whose gains are all zero does nothing anyway.
+            pub laws: Chosen,
+            $($(#[$doc])* pub $field: $type,)*
+        }
+
+        impl Control {
+            /// Names of the keys other than gains.
+            const KEYS: &[&str] = &["laws", $(stringify!($field)),*];
+
+            fn read_map<'de, A: MapAccess<'de>>(mut map: A) -> Result<Self, A::Error> {
+                let mut gains = PerGain::all(None);
+                let mut laws = None;
+                $(let mut $field = None;)*
+                while let Some(key) = map.next_key::<String>()? {
+                    let known = GAINS.iter().zip(gains.iter_mut()).find(|(gain, _)| gain.key == key);
+                    match (known, key.as_str()) {
+                        (Some((_, place)), _) => *place = Some(map.next_value()?),
+                        (None, "laws") => laws = Some(chosen(map.next_value()?)?),
+                        $((None, stringify!($field)) => $field = Some(map.next_value()?),)*
+                        (None, _) => return Err(A::Error::unknown_field(&key, &ALL_KEYS)),
+                    }
+                }
+                for (gain, value) in GAINS.iter().zip(gains.grasp) {
+                    value.ok_or_else(|| A::Error::missing_field(gain.key))?;
+                }
+                Ok(Self {
+                    gains: gains.map(|value: &Option<f64>| value.unwrap_or(0.0)),
+                    laws: laws.unwrap_or(Chosen::ALL),
+                    $($field: $field.unwrap_or($default),)*
+                })
+            }
+        }
+
+        impl Serialize for Control {
+            fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+                let mut map = serializer.serialize_map(None)?;
+                for (gain, value) in GAINS.iter().zip(self.gains.iter()) {
+                    map.serialize_entry(gain.key, value)?;
+                }
+                if self.laws != Chosen::ALL {
+                    let names = (0..).zip(LAWS).filter(|&(k, _)| self.laws.has(k)).map(|(_, (name, _))| name);
+                    map.serialize_entry("laws", &names.collect::<Vec<_>>())?;
+                }
+                $(map.serialize_entry(stringify!($field), &self.$field)?;)*
+                map.end()
+            }
+        }
+    };
+}
+
+control! {
+    /// Factor on the damping gains of the hand's joints.
+    damping_scale: f64 = 1.0;
+    /// Whether the term `g` of Eq. 30 holds the weight of the links.
+    gravity_compensation: bool = true;
+    /// Sampling period, s.
+    period_s: f64 = 1e-3;
+    /// Time over which `f_d` rises from zero, s.
+    soft_start_s: f64 = 0.0;
+    /// Bandwidth of the estimate of joint angles and speeds from the encoder counts, Hz. Ideal sensors need no estimate.
+    estimator_bandwidth_hz: f64 = 50.0;
+    /// Whether soft end stops keep the joints within their limits.
+    end_stops: bool = true;
+}
+
+/// Every key, for suggestions.
+static ALL_KEYS: LazyLock<Vec<&'static str>> =
+    LazyLock::new(|| GAINS.iter().map(|gain| gain.key).chain(Control::KEYS.iter().copied()).collect());
+
+/// The laws of these names.
+fn chosen<E: de::Error>(names: Vec<String>) -> Result<Chosen, E> {
+    names.iter().try_fold(Chosen::NONE, |chosen, name| {
+        let number = (0..).zip(LAWS).find(|(_, (known, _))| known == name).map(|(number, _)| number);
+        let known = || LAWS.iter().map(|(known, _)| format!("`{known}`")).collect::<Vec<_>>().join(", ");
+        let number =
+            number.ok_or_else(|| E::custom(format!("`laws` names `{name}`; there are {}", known())))?;
+        Ok(chosen.with(number, true))
+    })
+}
+
+impl Control {
+    /// Returns the nominal grasping force `f_d` of Eq. 30, N. The fingertips' force follows from it by Eq. 57.
+    pub fn force_n(&self) -> f64 {
+        self.gains.grasp[0]
+    }
+
+    /// Returns the stiffness `K_st` of the relative attitude constraint of Eq. 32, N m; 0 for the normal forces alone.
+    pub fn attitude_stiffness_nm(&self) -> f64 {
+        self.gains.grasp[1]
+    }
+}
+
+impl<'de> Deserialize<'de> for Control {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct Keys;
+        impl<'de> Visitor<'de> for Keys {
+            type Value = Control;
+
+            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                f.write_str("a map")
+            }
+
+            fn visit_map<A: MapAccess<'de>>(self, map: A) -> Result<Control, A::Error> {
+                Control::read_map(map)
+            }
+        }
+        deserializer.deserialize_map(Keys)
+    }
+}

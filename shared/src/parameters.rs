@@ -1,0 +1,459 @@
+//! The table of parameters: every number of the configuration that can be read, and while the hand is disarmed set, one by
+//! one over the line. What belongs to the hand itself is built in.
+//!
+//! **The hand's file is the ceiling.** The configuration that a hand starts with, its file's, says the most that the line
+//! may set a limit to, and the least of what protects ([`Bound`]): over the line a limit is made tighter, never looser.
+//!
+//! A row is a name, its unit and words, and where in the configuration it is kept. Gains, their limits and the choice of
+//! laws have their rows by the list of [laws](crate::control).
+
+use crate::command::Refusal;
+use crate::control::{GAIN_COUNT, GAINS, Gain, LAWS};
+pub use crate::parameter::Each;
+
+use crate::parameter::Text;
+use crate::tick::{Config, Params};
+use core::fmt;
+use nalgebra::Vector3;
+use serde::{Deserialize, Serialize};
+
+/// How far the line may move a parameter from what the hand's file says.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Bound {
+    /// As far as it can be used.
+    Free,
+    /// Down only.
+    AtMost,
+    /// Up only.
+    AtLeast,
+}
+
+/// A parameter: the number of its row, which is its byte on the line.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(try_from = "u8", into = "u8")]
+pub struct Parameter(u8);
+
+/// The name of a row, its unit and its words. Apart from the rest, because the firmware has no use for them.
+#[derive(Clone, Copy)]
+struct Label {
+    key: Text,
+    unit: &'static str,
+    words: Text,
+}
+
+/// The rest of a row.
+#[derive(Clone, Copy)]
+struct Row {
+    each: Each,
+    bound: Bound,
+    place: Place,
+}
+
+/// Where a parameter is kept.
+#[derive(Clone, Copy)]
+enum Place {
+    /// In the configuration, where the row says.
+    Row(Number),
+    /// Among the gains.
+    Gain(u8),
+    /// Among the limits of the gains.
+    Limit(u8),
+    /// In the choice of laws.
+    Law(u8),
+}
+
+/// Writes the rows, a constant for each, and where it is kept.
+macro_rules! parameters {
+    ($($name:ident, $each:ident, $bound:ident, $key:literal, $unit:literal, $words:literal,
+        $group:ident.$($field:ident).+;)*) => {
+        /// The rows that are not of laws.
+        #[allow(non_camel_case_types, clippy::upper_case_acronyms)]
+        #[derive(Clone, Copy)]
+        enum Number { $($name,)* }
+
+        const ROWS: &[Row] = &[
+            $(Row { each: Each::$each, bound: Bound::$bound, place: Place::Row(Number::$name) },)*
+        ];
+        const LABELS: &[Label] = &[
+            $(Label { key: Text::plain($key), unit: $unit, words: Text::plain($words) },)*
+        ];
+
+        impl Parameter {
+            $(#[doc = concat!($words, ", ", $unit, ".")]
+            pub const $name: Self = Self(Number::$name as u8);)*
+        }
+
+        /// Returns the field of a row.
+        fn field<const J: usize>(config: &Config<J>, number: Number) -> &dyn Field {
+            match number { $(Number::$name => &config.$group.$($field).+,)* }
+        }
+
+        /// Returns the field of a row, to be changed.
+        fn field_mut<const J: usize>(config: &mut Config<J>, number: Number) -> &mut dyn Field {
+            match number { $(Number::$name => &mut config.$group.$($field).+,)* }
+        }
+    };
+}
+
+#[rustfmt::skip]
+parameters! {
+    DAMPING,          Joint, Free,    "damping_nm_s",                  "N m s/rad", "Damping of a joint",                                        laws.hold.damping_nm_s;
+    GRAVITY,          Axis,  Free,    "gravity_m_s2",                  "m/s^2",     "Gravity in the base frame",                                 laws.hold.gravity_m_s2;
+    BANDWIDTH,        Hand,  Free,    "estimator.bandwidth_hz",        "Hz",        "Bandwidth of the estimator",                                estimator.bandwidth_hz;
+    TORQUE_LIMIT,     Joint, AtMost,  "limits.torque_nm",              "N m",       "Largest torque of a joint",                                 limits.torque_nm;
+    SLEW_LIMIT,       Joint, AtMost,  "limits.slew_nm_s",              "N m/s",     "Largest change of a joint's torque",                        limits.slew_nm_s;
+    STOP_MARGIN,      Joint, AtLeast, "limits.stops.margin_rad",       "rad",       "Where a soft end stop begins before its end",               limits.stop_margin_rad;
+    STOP_STIFFNESS,   Joint, AtLeast, "limits.stops.stiffness_nm_rad", "N m/rad",   "Stiffness of a soft end stop",                              limits.stop_stiffness_nm_rad;
+    STOP_DAMPING,     Joint, AtLeast, "limits.stops.damping_nm_s",     "N m s/rad", "Damping of a soft end stop",                                limits.stop_damping_nm_s;
+    POSSIBLE_SPEED,   Joint, AtMost,  "faults.possible_speed_rad_s",   "rad/s",     "Speed that a joint can't reach",                            faults.possible_speed_rad_s;
+    SPEED_LIMIT,      Joint, AtMost,  "faults.speed_limit_rad_s",      "rad/s",     "Speed that a joint must not reach",                         faults.speed_limit_rad_s;
+    RANGE_SLACK,      Hand,  AtMost,  "faults.range_slack_rad",        "rad",       "Angle by which a joint may be beyond its range",            faults.range_slack_rad;
+    SATURATED_TIME,   Hand,  AtMost,  "faults.saturated_ms",           "ms",        "Time for which a torque may stay at its limit",             faults.saturated_ms;
+    FROZEN_TORQUE,    Joint, AtMost,  "faults.frozen_torque_nm",       "N m",       "Change of torque that is too much for a joint that stands still", faults.frozen_torque_nm;
+    FROZEN_NEIGHBOUR, Hand,  AtMost,  "faults.frozen_neighbour_rad",   "rad",       "Turn of a neighbour that is too much for a joint that stands still", faults.frozen_neighbour_rad;
+    FROZEN_TIME,      Hand,  AtMost,  "faults.frozen_ms",              "ms",        "Shortest standstill that counts",                           faults.frozen_ms;
+    HEARTBEAT_TIME,   Hand,  AtMost,  "faults.heartbeat_ms",           "ms",        "Time for which the heartbeat may fail",                     faults.heartbeat_ms;
+    LATE_TICKS,       Hand,  AtMost,  "faults.late_ticks",             "",          "Number of ticks in a row that may be late",                 faults.late_ticks;
+    ENERGY,           Hand,  AtMost,  "faults.energy_j",               "J",         "Work in a second that the joints may do beyond the drop of the law's potentials", faults.energy_j;
+    SOFT_START_TIME,  Hand,  AtLeast, "supervisor.soft_start_ms",      "ms",        "Time over which the force grows",                           supervisor.soft_start_ms;
+    RELEASE_TIME,     Hand,  AtMost,  "supervisor.release_ms",         "ms",        "Time over which force and stiffness fall",                  supervisor.release_ms;
+}
+
+/// Every row: those above, the gains, their limits, the laws.
+const TABLE: [Row; Parameter::COUNT] = {
+    let mut table = [Row { each: Each::Hand, bound: Bound::Free, place: Place::Law(0) }; Parameter::COUNT];
+    let (mut at, mut k) = (0, 0);
+    while k < ROWS.len() {
+        table[at] = ROWS[k];
+        (at, k) = (at + 1, k + 1);
+    }
+    k = 0;
+    while k < GAIN_COUNT {
+        table[at].place = Place::Gain(k as u8);
+        table[at + GAIN_COUNT].place = Place::Limit(k as u8);
+        table[at + GAIN_COUNT].bound = Bound::AtMost;
+        (at, k) = (at + 1, k + 1);
+    }
+    at += GAIN_COUNT;
+    k = 0;
+    while k < LAWS.len() {
+        table[at].place = Place::Law(k as u8);
+        (at, k) = (at + 1, k + 1);
+    }
+    table
+};
+
+impl Parameter {
+    /// Number of parameters.
+    pub const COUNT: usize = ROWS.len() + 2 * GAIN_COUNT + LAWS.len();
+
+    /// Every parameter, in the order of their bytes on the wire.
+    pub const ALL: [Self; Self::COUNT] = {
+        assert!(Self::COUNT <= 64, "the identity has a bit for each");
+        let mut all = [Self(0); Self::COUNT];
+        let mut k = 0;
+        while k < Self::COUNT {
+            all[k] = Self(k as u8);
+            k += 1;
+        }
+        all
+    };
+
+    /// Returns the parameter of this name.
+    pub fn named(key: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|parameter| parameter.key() == key)
+    }
+
+    /// Returns the parameter that is a gain, by its number in the table of [gains](crate::control::GAINS).
+    pub const fn gain(number: usize) -> Self {
+        Self((ROWS.len() + number) as u8)
+    }
+
+    /// Returns the number of its row, which is its byte on the line.
+    pub const fn number(self) -> u8 {
+        self.0
+    }
+
+    fn row(self) -> Row {
+        // There is a row for every number.
+        TABLE.get(usize::from(self.0)).copied().unwrap_or(TABLE[0])
+    }
+
+    fn label(self) -> Label {
+        match self.row().place {
+            Place::Row(number) => LABELS[number as usize],
+            Place::Gain(k) => {
+                let Gain { key, unit, words, .. } = GAINS[usize::from(k)];
+                Label { key: key.into(), unit, words: words.into() }
+            }
+            Place::Limit(k) => {
+                let Gain { key, unit, words, .. } = GAINS[usize::from(k)];
+                let words = Text::new("Most that may be asked for of: ", words);
+                Label { key: Text::new("limits.", key), unit, words }
+            }
+            Place::Law(k) => {
+                let (key, words) = LAWS[usize::from(k)];
+                let words = Text::new("1 where it may act, else 0: ", words);
+                Label { key: Text::new("laws.", key), unit: "", words }
+            }
+        }
+    }
+
+    /// Returns its name.
+    pub fn key(self) -> Text {
+        self.label().key
+    }
+
+    /// Returns its unit; empty for a pure number.
+    pub fn unit(self) -> &'static str {
+        self.label().unit
+    }
+
+    /// Returns what it is, in words.
+    pub fn words(self) -> Text {
+        self.label().words
+    }
+
+    /// Returns what its index counts.
+    pub fn each(self) -> Each {
+        self.row().each
+    }
+
+    /// Returns how many there are in a hand of so many joints.
+    pub fn count(self, joint_count: usize) -> u8 {
+        match self.each() {
+            Each::Hand => 1,
+            Each::Joint => joint_count as u8,
+            Each::Axis => 3,
+        }
+    }
+
+    /// Returns how far the line may move it from what the hand's file says. Gains have limits of their own.
+    pub fn bound(self) -> Bound {
+        self.row().bound
+    }
+
+    /// Whether it says how firmly to grasp, so that it may be asked for with each grasp.
+    pub fn is_gain(self) -> bool {
+        matches!(self.row().place, Place::Gain(_))
+    }
+}
+
+impl fmt::Display for Parameter {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.key().fmt(f)
+    }
+}
+
+impl TryFrom<u8> for Parameter {
+    type Error = Refusal;
+
+    fn try_from(number: u8) -> Result<Self, Refusal> {
+        if usize::from(number) < Self::COUNT { Ok(Self(number)) } else { Err(Refusal::NoSuchParameter) }
+    }
+}
+
+impl From<Parameter> for u8 {
+    fn from(parameter: Parameter) -> Self {
+        parameter.0
+    }
+}
+
+/// A number in the configuration, or one for each joint or axis, which may be switched off.
+trait Field {
+    /// Returns the value; `None` where it is switched off.
+    fn get(&self, k: usize) -> Option<f32>;
+
+    /// Sets the value, switched on with zeros for its neighbours if it was off; `None` switches it off with all of them.
+    fn put(&mut self, k: usize, value: Option<f32>) -> Result<(), Refusal>;
+}
+
+impl Field for f32 {
+    fn get(&self, _: usize) -> Option<f32> {
+        Some(*self)
+    }
+
+    fn put(&mut self, _: usize, value: Option<f32>) -> Result<(), Refusal> {
+        *self = value.ok_or(Refusal::OutOfRange)?;
+        Ok(())
+    }
+}
+
+impl Field for u32 {
+    fn get(&self, _: usize) -> Option<f32> {
+        Some(*self as f32)
+    }
+
+    fn put(&mut self, _: usize, value: Option<f32>) -> Result<(), Refusal> {
+        let value = value.ok_or(Refusal::OutOfRange)?;
+        let whole = value as u32;
+        if whole as f32 != value {
+            return Err(Refusal::OutOfRange);
+        }
+        *self = whole;
+        Ok(())
+    }
+}
+
+impl<const N: usize> Field for [f32; N] {
+    fn get(&self, k: usize) -> Option<f32> {
+        <[f32]>::get(self, k).copied()
+    }
+
+    fn put(&mut self, k: usize, value: Option<f32>) -> Result<(), Refusal> {
+        *self.get_mut(k).ok_or(Refusal::NoSuchParameter)? = value.ok_or(Refusal::OutOfRange)?;
+        Ok(())
+    }
+}
+
+impl Field for Vector3<f32> {
+    fn get(&self, k: usize) -> Option<f32> {
+        self.as_slice().get(k).copied()
+    }
+
+    fn put(&mut self, k: usize, value: Option<f32>) -> Result<(), Refusal> {
+        let place = self.as_mut_slice().get_mut(k).ok_or(Refusal::NoSuchParameter)?;
+        *place = value.ok_or(Refusal::OutOfRange)?;
+        Ok(())
+    }
+}
+
+/// All zeros.
+trait Blank {
+    const BLANK: Self;
+}
+
+impl Blank for f32 {
+    const BLANK: Self = 0.0;
+}
+
+impl Blank for u32 {
+    const BLANK: Self = 0;
+}
+
+impl<const N: usize> Blank for [f32; N] {
+    const BLANK: Self = [0.0; N];
+}
+
+impl Blank for Vector3<f32> {
+    const BLANK: Self = Vector3::new(0.0, 0.0, 0.0);
+}
+
+impl<F: Field + Blank> Field for Option<F> {
+    fn get(&self, k: usize) -> Option<f32> {
+        self.as_ref()?.get(k)
+    }
+
+    fn put(&mut self, k: usize, value: Option<f32>) -> Result<(), Refusal> {
+        if value.is_none() {
+            *self = None;
+            return Ok(());
+        }
+        self.get_or_insert(F::BLANK).put(k, value)
+    }
+}
+
+impl<const J: usize> Config<J> {
+    /// Returns a parameter; `None` where what it belongs to is switched off.
+    ///
+    /// # Errors
+    /// There is no such parameter.
+    pub fn value(&self, joint_count: usize, parameter: Parameter, index: u8) -> Result<Option<f32>, Refusal> {
+        if index >= parameter.count(joint_count) {
+            return Err(Refusal::NoSuchParameter);
+        }
+        Ok(match parameter.row().place {
+            Place::Row(number) => field(self, number).get(index.into()),
+            Place::Gain(k) => self.laws.gains.iter().nth(k.into()).copied(),
+            Place::Limit(k) => self.limits.gains.iter().nth(k.into()).copied().flatten(),
+            Place::Law(k) => Some(if self.laws.chosen.has(k) { 1.0 } else { 0.0 }),
+        })
+    }
+
+    /// Puts a parameter in, without looking at the others: [`Params::new`] does. `None` switches off what it belongs to,
+    /// with all its joints; a value switches it on, with zeros for the rest.
+    ///
+    /// # Errors
+    /// There is no such parameter, it can't be switched off, or it is a whole number and the value is none.
+    pub fn put(
+        &mut self,
+        joint_count: usize,
+        parameter: Parameter,
+        index: u8,
+        value: Option<f32>,
+    ) -> Result<(), Refusal> {
+        if index >= parameter.count(joint_count) {
+            return Err(Refusal::NoSuchParameter);
+        }
+        let none = Refusal::NoSuchParameter;
+        match parameter.row().place {
+            Place::Row(number) => field_mut(self, number).put(index.into(), value),
+            Place::Gain(k) => self.laws.gains.iter_mut().nth(k.into()).ok_or(none)?.put(0, value),
+            Place::Limit(k) => self.limits.gains.iter_mut().nth(k.into()).ok_or(none)?.put(0, value),
+            Place::Law(k) => {
+                let (Some(0.0) | Some(1.0)) = value else { return Err(Refusal::OutOfRange) };
+                self.laws.chosen = self.laws.chosen.with(k, value == Some(1.0));
+                Ok(())
+            }
+        }
+    }
+}
+
+/// The value of a parameter, and the hand's file's.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Setting {
+    /// The value that acts.
+    pub value: f32,
+    /// The value in the hand's file.
+    pub file: f32,
+}
+
+impl<const J: usize, const F: usize> Params<J, F> {
+    /// Returns a parameter as it is, and as the hand's file has it. Times in ms are whole numbers.
+    ///
+    /// # Errors
+    /// There is no such parameter, or what it belongs to is switched off.
+    pub fn get(&self, parameter: Parameter, index: u8) -> Result<Setting, Refusal> {
+        let joint_count = self.hand().joint_count();
+        let value = self.config().value(joint_count, parameter, index)?;
+        let file = self.file().value(joint_count, parameter, index)?;
+        value.zip(file).map(|(value, file)| Setting { value, file }).ok_or(Refusal::SwitchedOff)
+    }
+
+    /// Sets a parameter, if it can be used with all the others, and is no looser than in the hand's file.
+    ///
+    /// # Errors
+    /// There is no such parameter, what it belongs to is switched off, or the value is not finite, not whole where it
+    /// has to be, out of its range, or looser than the hand's file allows. Nothing changes then.
+    pub fn set(&mut self, parameter: Parameter, index: u8, value: f32) -> Result<(), Refusal> {
+        if !value.is_finite() {
+            return Err(Refusal::NotFinite);
+        }
+        let Setting { file, .. } = self.get(parameter, index)?;
+        let is_looser = match parameter.bound() {
+            Bound::Free => false,
+            Bound::AtMost => value > file,
+            Bound::AtLeast => value < file,
+        };
+        if is_looser {
+            return Err(Refusal::BeyondFile);
+        }
+        let mut config = *self.config();
+        config.put(self.hand().joint_count(), parameter, index, Some(value))?;
+        self.configure(&config).map_err(|_| Refusal::OutOfRange)?;
+        let bit = 1 << parameter.number();
+        self.changed = if self.differs(parameter) { self.changed | bit } else { self.changed & !bit };
+        Ok(())
+    }
+
+    /// Whether a parameter is other than in the hand's file, of any joint or axis.
+    fn differs(&self, parameter: Parameter) -> bool {
+        (0..parameter.count(self.hand().joint_count()))
+            .any(|index| self.get(parameter, index).is_ok_and(|setting| setting.value != setting.file))
+    }
+
+    /// Returns the parameters that differ from the hand's file: a bit for each, by its number.
+    pub fn changed(&self) -> u64 {
+        self.changed
+    }
+}
