@@ -596,12 +596,8 @@ mod tests {
     }
 
     fn answers() -> impl Strategy<Value = Option<Answer>> {
-        let grasp =
-            any::<[Option<f32>; 3]>().prop_map(|[force_n, attitude_stiffness_nm, integral_gain_nm_rad]| {
-                Command::Grasp(Grasp {
-                    gains: PerGain::of([force_n, attitude_stiffness_nm, integral_gain_nm_rad]),
-                })
-            });
+        let grasp = any::<[Option<f32>; GAIN_COUNT]>()
+            .prop_map(|gains| Command::Grasp(Grasp { gains: PerGain::of(gains) }));
         let command = prop_oneof![proptest::sample::select(&Command::ALL[..]), grasp];
         let refused = proptest::option::of(proptest::sample::select(Refusal::ALL));
         proptest::option::of((command, refused).prop_map(|(command, refused)| Answer { command, refused }))

@@ -3,7 +3,7 @@
 mod common;
 
 use blindgrasp_shared::command::{Command, Grasp, Refusal};
-use blindgrasp_shared::control::PerGain;
+use blindgrasp_shared::control::{GAIN_COUNT, PerGain};
 use blindgrasp_shared::device::{Device, Inputs, Outputs, Reading};
 use blindgrasp_shared::event::Event;
 use blindgrasp_shared::fault::{Fault, Raised};
@@ -404,12 +404,8 @@ fn the_longest_messages_fit() {
 /// Requests of every kind, most with values that can't be used.
 fn requests() -> impl Strategy<Value = Request<12>> {
     let parameter = proptest::sample::select(Parameter::ALL.to_vec());
-    let grasp =
-        any::<[Option<f32>; 3]>().prop_map(|[force_n, attitude_stiffness_nm, integral_gain_nm_rad]| {
-            Command::Grasp(Grasp {
-                gains: PerGain::of([force_n, attitude_stiffness_nm, integral_gain_nm_rad]),
-            })
-        });
+    let grasp = any::<[Option<f32>; GAIN_COUNT]>()
+        .prop_map(|gains| Command::Grasp(Grasp { gains: PerGain::of(gains) }));
     prop_oneof![
         any::<u16>().prop_map(|interface_version| Request::Hello { interface_version }),
         proptest::sample::select(&Command::ALL[..]).prop_map(Request::Command),

@@ -63,13 +63,8 @@ fn script(seed: u64, ticks: usize) -> Vec<Step> {
                 _ => {}
             }
             silent = silent.saturating_sub(1);
-            let integral_gain_nm_rad = Some(0.01 * lcg.below(3) as f32);
-            let grasp = Grasp {
-                gains: PerGain {
-                    grasp: [Some(lcg.below(16) as f32), None],
-                    integral: [integral_gain_nm_rad],
-                },
-            };
+            let integral = [Some(0.01 * lcg.below(3) as f32)];
+            let grasp = Grasp { gains: PerGain { grasp: [Some(lcg.below(16) as f32), None], integral } };
             let command = match lcg.below(160) {
                 0..10 => Some(Command::Arm),
                 10..20 => Some(Command::Grasp(Grasp::CONFIGURED)),

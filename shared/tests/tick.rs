@@ -581,8 +581,8 @@ fn a_failed_reading_does_no_work() {
 #[test]
 fn a_grasp_is_as_firm_as_asked_for_within_the_limits() {
     let params: TestParams = params(&config());
-    let grasp = |force_n, attitude_stiffness_nm, integral_gain_nm_rad| {
-        Command::Grasp(Grasp { gains: PerGain::of([force_n, attitude_stiffness_nm, integral_gain_nm_rad]) })
+    let grasp = |force, stiffness, integral| {
+        Command::Grasp(Grasp { gains: PerGain::of([force, stiffness, integral]) })
     };
     let counts = facing_counts();
     let mut state = in_mode(&params, Mode::Armed);

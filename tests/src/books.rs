@@ -164,15 +164,15 @@ pub fn true_excess_j(scene: &Scene, outcome: &Outcome) -> Vec<f64> {
         let account = laws.torques(&stance, &[0.0; MAX_JOINTS], Some(&Grip { latch: &latch, gains })).1;
         account.potentials_j.iter().sum::<f64>() - account.weight_potential_j
     };
-    let mut excess_j = vec![0.0];
+    let mut excesses_j = vec![0.0];
     for (pair, turned) in samples.windows(2).zip(&outcome.turned) {
         let [before, now] = pair else { continue };
         let turns = now.angles_rad.iter().zip(&before.angles_rad).map(|(now, before)| now - before);
         let work_j: f64 = before.torques_nm.iter().zip(turns).map(|(torque, turn)| torque * turn).sum();
         // At the gains of the tick before, as the ledger has it.
         let drop_j = potential_j(before, turned) - potential_j(now, turned);
-        let last_j = excess_j[excess_j.len() - 1];
-        excess_j.push(last_j + work_j - drop_j - last_j * scene.control.period_s);
+        let last_j = excesses_j[excesses_j.len() - 1];
+        excesses_j.push(last_j + work_j - drop_j - last_j * scene.control.period_s);
     }
-    excess_j
+    excesses_j
 }

@@ -8,7 +8,7 @@ use blindgrasp::MAX_JOINTS;
 use blindgrasp::scene::HandModel;
 use blindgrasp_shared::command::{Answer, Command, Grasp, Refusal};
 use blindgrasp_shared::control::PerGain;
-use blindgrasp_shared::control::{GAINS, Signal};
+use blindgrasp_shared::control::{GAINS, PerSignal, Signal};
 use blindgrasp_shared::event::{Event, Events};
 use blindgrasp_shared::fault::{Fault, Raised, Reaction};
 use blindgrasp_shared::identity::{Clock, Crash, CrashKind, Identity, Image, ResetCause, UNITS};
@@ -189,12 +189,9 @@ fn faulted() -> AnyRecord {
         answer: Some(Answer { command: Command::ClearFault, refused: Some(Refusal::FaultPersists) }),
         events: Events::NONE.with(Event::Late, true),
         reading_failed: Some(Raised::of_hand(Fault::SampleMissing)),
-        force_n: 5.0,
-        attitude_stiffness_nm: 0.005,
-        integral_gain_nm_rad: 0.375,
-        approach_potential_j: 0.25,
-        attitude_potential_j: 0.125,
-        integral_potential_j: 0.75,
+        gains: PerGain::of([5.0, 0.005, 0.375]),
+        potentials_j: PerGain::of([0.25, 0.125, 0.75]),
+        law_signals: PerSignal::all(0.0),
         work_j: -0.5,
         damped_j: 0.03125,
         excess_j: 0.0625,
@@ -223,12 +220,9 @@ fn grasping(k: u32, decimation: u16, step: i32) -> AnyRecord {
         answer: None,
         events: Events::NONE.with(Event::Heartbeat, k % 50 == 3),
         reading_failed: None,
-        force_n: 5.0 * share,
-        attitude_stiffness_nm: 0.005,
-        integral_gain_nm_rad: 0.0,
-        approach_potential_j: 0.2 - 0.1 * share,
-        attitude_potential_j: 0.001 * share,
-        integral_potential_j: 0.0,
+        gains: PerGain::of([5.0 * share, 0.005, 0.0]),
+        potentials_j: PerGain::of([0.2 - 0.1 * share, 0.001 * share, 0.0]),
+        law_signals: PerSignal::all(0.0),
         work_j: 0.002 + 0.003 * share,
         damped_j: 0.0005 * share,
         excess_j: -0.001 * share,
@@ -718,7 +712,7 @@ fn the_tables_of_the_document_are_those_of_the_code() {
     let head = ["number", "key", "index", "unit", "the file's is the", "meaning"];
     check(DOCUMENT, "parameters", &table(head, &parameters));
     let mut signals = Vec::new();
-    Record::BLANK.tell(|told: Told<'_>| {
+    AnyRecord::BLANK.tell(|told: Told<'_>| {
         let each = if told.each == Each::Joint { "joint" } else { "" };
         let Signal { key, unit, words } = told.signal;
         signals.push([format!("`{key}`"), each.into(), unit.into(), words.into()]);

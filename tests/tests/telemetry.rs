@@ -329,9 +329,9 @@ fn swinging(config: &Config<MAX_JOINTS>, tick: u64, speed_rad_s: f64) -> Reading
 fn a_minute_at_the_speed_of_the_motors_loses_nothing() {
     let mut config = hand_config();
     config.faults = FaultConfig { heartbeat_ms: config.faults.heartbeat_ms, ..FaultConfig::LEAST };
-    for (speed_rad_s, integral_gain_nm_rad) in [(20.0, 0.0), (70.0, 0.0), (70.0, 0.02), (185.0, 0.0)] {
-        config.laws.gains.integral[0] = integral_gain_nm_rad;
-        config.limits.gains.integral[0] = Some(integral_gain_nm_rad);
+    for (speed_rad_s, integral) in [(20.0, 0.0), (70.0, 0.0), (70.0, 0.02), (185.0, 0.0)] {
+        config.laws.gains.integral[0] = integral;
+        config.limits.gains.integral[0] = Some(integral);
         let mut line = Line::new(&config, 1e6);
         for tick in 0..60_000 {
             let command = match tick {
@@ -343,7 +343,7 @@ fn a_minute_at_the_speed_of_the_motors_loses_nothing() {
             let record = line.turn(reading, command).record;
             assert!(tick <= 70 || record.mode == Mode::Grasping, "{record:?}");
         }
-        line.print(&format!("1 Mbaud, {speed_rad_s} rad/s, K_I {integral_gain_nm_rad} N m/rad"));
+        line.print(&format!("1 Mbaud, {speed_rad_s} rad/s, K_I {integral} N m/rad"));
         let mean = line.sent.iter().sum::<usize>() as f64 / line.sent.len() as f64;
         assert!(speed_rad_s > 70.0 || mean <= 80.0, "{mean}");
         assert_eq!((line.dropped, line.heard.missing), (0, 0));

@@ -236,7 +236,7 @@ mod tests {
             ("sequence", |t| t.record.sequence += 1),
             ("count", |t| t.record.counts = List::first_of([1; crate::MAX_JOINTS], 3)),
             ("torque_nm", |t| t.record.torques_nm = List::default()),
-            ("excess_j", |t| t.record.excess_j = 1e-30),
+            ("damped_j", |t| t.record.damped_j = 1e-30),
             ("answer to the request", |t| t.answer = Some(Answer::Refused(Refusal::Busy))),
         ];
         for (what, change) in changes {

@@ -4,6 +4,7 @@ use blindgrasp::MAX_JOINTS;
 use blindgrasp::record::mcap::{About, Entry, Record, Recording, Setting, What};
 use blindgrasp::scene::{HandFile, HandModel};
 use blindgrasp_shared::command::{Answer, Command, Refusal};
+use blindgrasp_shared::control::PerGain;
 use blindgrasp_shared::event::{Event, Events};
 use blindgrasp_shared::fault::{Fault, Raised};
 use blindgrasp_shared::identity::{Clock, Identity, Image, ResetCause, UNITS};
@@ -91,16 +92,11 @@ impl Hand {
         record.reading_failed = failed.then(|| Raised::at(0, Fault::SampleMissing));
         record.events = Events::NONE.with(Event::Heartbeat, random.bool()).with(Event::Late, limited);
         let mut float = |scale: f32| scale * (random.f32() - 0.5);
-        record.gains.grasp[0] = float(20.0);
-        record.gains.grasp[1] = float(0.01);
-        record.potentials_j.grasp[0] = float(1.0);
-        record.potentials_j.grasp[1] = float(1.0);
-        record.work_j = float(1.0);
-        record.damped_j = float(1.0);
-        record.excess_j = float(1.0);
+        record.gains = PerGain { grasp: [float(20.0), float(0.01)], ..PerGain::all(0.0) };
+        record.potentials_j = PerGain { grasp: [float(1.0), float(1.0)], ..PerGain::all(0.0) };
+        (record.work_j, record.damped_j) = (float(1.0), float(1.0));
         if limited {
-            record.gains.integral[0] = float(0.1);
-            record.potentials_j.integral[0] = float(1.0);
+            (record.gains.integral, record.potentials_j.integral) = ([float(0.1)], [float(1.0)]);
         }
         let mut torques = [0.0; MAX_JOINTS];
         torques[..self.joints].iter_mut().for_each(|torque| *torque = float(3.0));

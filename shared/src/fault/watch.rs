@@ -319,9 +319,9 @@ impl<const J: usize> Watch<J> {
     }
 
     /// Whether the ledger's excess is more than it may be.
-    pub fn energy(&self, excess_j: f32) -> Option<Raised> {
+    pub fn energy(&self, energy_j: f32) -> Option<Raised> {
         let most = self.energy_j?;
-        (!(excess_j <= most)).then_some(Raised::of_hand(Fault::TooMuchEnergy))
+        (!(energy_j <= most)).then_some(Raised::of_hand(Fault::TooMuchEnergy))
     }
 
     /// Looks for counters that stand still although their torque and a neighbour changed since they last moved.
@@ -476,8 +476,8 @@ mod tests {
     fn too_much_energy_is_above_its_limit_or_no_number() {
         let watch = Watch { energy_j: Some(0.5), ..BLIND };
         let found = Some(Raised::of_hand(Fault::TooMuchEnergy));
-        assert_eq!([-9.0, 0.5].map(|excess_j| watch.energy(excess_j)), [None; 2]);
-        assert_eq!([0.501, f32::NAN].map(|excess_j| watch.energy(excess_j)), [found; 2]);
+        assert_eq!([-9.0, 0.5].map(|energy_j| watch.energy(energy_j)), [None; 2]);
+        assert_eq!([0.501, f32::NAN].map(|energy_j| watch.energy(energy_j)), [found; 2]);
         assert_eq!(BLIND.energy(1e9), None);
     }
 

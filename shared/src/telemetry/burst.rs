@@ -135,7 +135,6 @@ mod tests {
                 reading_failed: (tick % 2 == 0).then_some(Raised::of_hand(Fault::OutputFailed)),
                 gains: PerGain::all(5.0),
                 work_j: -1e-9,
-                excess_j: 1e-3,
                 cycles: 123,
                 late_ticks: 4,
                 dropped: 5,
