@@ -29,7 +29,18 @@ import tempfile
 import time
 import zlib
 
-INTERFACE_VERSION = 4
+from blindgrasp_tables import (
+    FAULTS,
+    GAINS,
+    INTERFACE_VERSION,
+    LAW_SIGNALS,
+    MODES,
+    PARAMETERS,
+    POTENTIALS,
+    RECORD_FIELDS,
+    REFUSALS,
+)
+
 HEARTBEAT_S = 0.05  # a fifth of the 250 ms after which a hand lets go
 PATIENCE_S = 1.0  # an answer takes a few ms
 WAITING_MOST = 5  # requests that wait for their answers; the hand holds 7
@@ -245,6 +256,19 @@ class List(Type):
         return varint(len(value), 32) + b"".join(map(self.item.encode, value))
 
 
+class Array(Type):
+    """So many of them, without their number."""
+
+    def __init__(self, item, count):
+        self.item, self.count = item, count
+
+    def read(self, reader):
+        return [self.item.read(reader) for _ in range(self.count)]
+
+    def encode(self, value):
+        return b"".join(map(self.item.encode, value))
+
+
 class Struct(Type):
     """Fields in their order; the value is a dict."""
 
@@ -299,89 +323,24 @@ U16, U32, I32 = Unsigned(16), Unsigned(32), Signed(32)
 
 # --------------------------------------------------------------------------------------------------- 3. Vocabulary
 
-FAULTS = {
-    1: "encoder gave no sample",
-    2: "angle, speed or torque is not a finite number",
-    3: "count changed by more than the joint can turn in a tick",
-    4: "angle is beyond its range",
-    5: "speed is above its limit",
-    6: "torque stayed at its limit for too long",
-    7: "count stands still although torque and neighbours changed",
-    8: "encoder lost its settings",
-    9: "amplifier's output does not answer",
-    10: "heartbeat of the host stopped",
-    11: "tick was late too often",
-    12: "joints put more energy into the world than they may",
-}
-
-REFUSALS = {
-    "NotArmed": "the hand is disarmed: arm it first",
-    "NotGrasping": "there is no grasp to release",
-    "Grasping": "a grasp is under way: release it first, or stop",
-    "Releasing": "a release is under way: wait for its end, or stop",
-    "InFault": "the hand is in a fault: clear it first",
-    "NoFault": "there is no fault to clear",
-    "FaultPersists": "the cause of the fault is still there: remove it first",
-    "NoHeartbeat": "there is no heartbeat: send it all the time while the hand is armed",
-    "FallbackClock": "the crystal did not start, so that the tick has no exact time: repair the board",
-    "NotFinite": "a value is not a finite number",
-    "OutOfRange": "a value is out of its range: the limits are parameters",
-    "NotDisarmed": "parameters are set while the hand is disarmed: disarm it, or clear its fault, first",
-    "NoSuchParameter": "this hand has no parameter with this index",
-    "SwitchedOff": "this limit is switched off in the hand's configuration",
-    "NoSession": "there is no session of this number: say hello first",
-    "OutOfOrder": "this request, or a later one, was taken before: number them upwards",
-    "OtherInterface": "this firmware has another interface version: use the tool that belongs to it",
-    "NotUnderstood": "this is no request of this interface version",
-    "Busy": "too many requests are waiting: wait for the answers",
-    "JointsAreReal": "this image has real joints: only the image `pil` takes them over the link",
-    "NoBurst": "no fault was caught since the hand was last armed",
-    "BurstNotOver": "the records after the fault are still being taken: ask again in a moment",
-}
-
-# Name on the wire, and the key that users know it by.
-PARAMETERS = {
-    "Force": "force_n",
-    "AttitudeStiffness": "attitude_stiffness_nm",
-    "IntegralGain": "integral_gain_nm_rad",
-    "Damping": "damping_nm_s",
-    "Gravity": "gravity_m_s2",
-    "EstimatorBandwidth": "estimator.bandwidth_hz",
-    "ForceLimit": "limits.force_n",
-    "StiffnessLimit": "limits.attitude_stiffness_nm",
-    "IntegralLimit": "limits.integral_gain_nm_rad",
-    "TorqueLimit": "limits.torque_nm",
-    "SlewLimit": "limits.slew_nm_s",
-    "StopMargin": "limits.stops.margin_rad",
-    "StopStiffness": "limits.stops.stiffness_nm_rad",
-    "StopDamping": "limits.stops.damping_nm_s",
-    "PossibleSpeed": "faults.possible_speed_rad_s",
-    "SpeedLimit": "faults.speed_limit_rad_s",
-    "RangeSlack": "faults.range_slack_rad",
-    "SaturatedTime": "faults.saturated_ms",
-    "FrozenTorque": "faults.frozen_torque_nm",
-    "FrozenNeighbour": "faults.frozen_neighbour_rad",
-    "FrozenTime": "faults.frozen_ms",
-    "HeartbeatTime": "faults.heartbeat_ms",
-    "LateTicks": "faults.late_ticks",
-    "Energy": "faults.energy_j",
-    "SoftStartTime": "supervisor.soft_start_ms",
-    "ReleaseTime": "supervisor.release_ms",
-}
-
-MODES = ["Disarmed", "Armed", "Grasping", "Releasing", "Fault"]
-HEARTBEAT, LATE, FALLBACK_CLOCK = 1, 2, 4  # events
 COUNTS, TORQUES, LIMITING, DENSE, STATE = 1, 2, 4, 8, 16  # signals
 
 # ----------------------------------------------------------------------------------------------------- 4. Messages
 
-PARAMETER = Enum(*PARAMETERS)
+
+
+def per_law(names, item):
+    """Values of the gains or signals of each law."""
+    return Struct(**{law: Array(item, len(of_law)) for law, of_law in names.items()})
+
+
+PARAMETER = Known(range(len(PARAMETERS)))
 REFUSAL = Enum(*REFUSALS)
 FAULT = Struct(fault=Known(FAULTS), joint=Option(BYTE))
 COMMAND = Enum(
     Arm=None,
     Disarm=None,
-    Grasp=Struct(force_n=Option(F32), attitude_stiffness_nm=Option(F32), integral_gain_nm_rad=Option(F32)),
+    Grasp=Struct(gains=per_law(GAINS, Option(F32))),
     Release=None,
     Stop=None,
     ClearFault=None,
@@ -400,31 +359,21 @@ PACKET = Struct(
         Burst=Struct(index=U16),
     ),
 )
-RECORD = Struct(
-    sequence=U32,
-    tick=U32,
-    mode=Enum(*MODES),
-    fault=Option(FAULT),
-    answer=Option(Struct(command=COMMAND, refused=Option(REFUSAL))),
-    events=BYTE,
-    reading_failed=Option(FAULT),
-    force_n=F32,
-    attitude_stiffness_nm=F32,
-    integral_gain_nm_rad=F32,
-    approach_potential_j=F32,
-    attitude_potential_j=F32,
-    integral_potential_j=F32,
-    work_j=F32,
-    damped_j=F32,
-    excess_j=F32,
-    cycles=U32,
-    late_ticks=U32,
-    dropped=U32,
-    decimation=U16,
-    counts=List(I32),
-    torques_nm=List(F32),
-    limiting=List(BYTE),
-)
+FIELDS = {
+    "u16": U16,
+    "u32": U32,
+    "f32": F32,
+    "Mode": Enum(*MODES),
+    "Option<Raised>": Option(FAULT),
+    "Option<Answer>": Option(Struct(command=COMMAND, refused=Option(REFUSAL))),
+    "Events": BYTE,
+    "PerGain<f32>": per_law(GAINS, F32),
+    "PerSignal<f32>": per_law(LAW_SIGNALS, F32),
+    "List<i32, J>": List(I32),
+    "List<f32, J>": List(F32),
+    "List<Limiting, J>": List(BYTE),
+}
+RECORD = Struct(**{name: FIELDS[kind] for name, kind in RECORD_FIELDS})
 IDENTITY = Struct(
     image=Struct(
         interface_version=U16,
@@ -447,11 +396,12 @@ IDENTITY = Struct(
             kind=Enum("Panic", "HardFault"), program_counter=U32, link_register=U32, line=U32, file_hash=U32
         )
     ),
+    changed=Unsigned(64),
 )
 REPLY = Enum(
     Identity=Struct(sequence=U16, session=U16, identity=IDENTITY),
     Answer=Struct(sequence=U16, refused=Option(REFUSAL)),
-    Value=Struct(sequence=U16, parameter=PARAMETER, index=BYTE, value=F32),
+    Value=Struct(sequence=U16, parameter=PARAMETER, index=BYTE, setting=Struct(value=F32, file=F32)),
     Record=RECORD,
     Burst=Struct(sequence=U16, index=U16, count=U16, record=RECORD),
     Snapshot=Struct(tick=U32, offset=U16, length=U16, bytes=List(BYTE)),
@@ -485,18 +435,21 @@ class Unusable(Exception):
 
 DENSE_TAG = 6
 WINDOW = 8  # a dense record can be read after any of so many before it
-# Law and ledger.
+# Law and ledger, as places in a record.
 MONITORS = [
-    "force_n",
-    "attitude_stiffness_nm",
-    "integral_gain_nm_rad",
-    "approach_potential_j",
-    "attitude_potential_j",
-    "integral_potential_j",
-    "work_j",
-    "damped_j",
-    "excess_j",
-]
+    (field, law, k)
+    for field, names in [("gains", GAINS), ("potentials_j", GAINS), ("law_signals", LAW_SIGNALS)]
+    for law, of_law in names.items()
+    for k in range(len(of_law))
+] + [(field,) for field in ("work_j", "damped_j", "excess_j")]
+
+
+def at(record, path):
+    for step in path:
+        record = record[step]
+    return record
+
+
 # Of each, the bit that says that it follows: stiffness and integral gain share one.
 FOLLOWS = [1, 2, 2, 4, 8, 16, 32, 64, 128]
 
@@ -583,9 +536,9 @@ class Replies:
             self.lost = True
             raise Unusable("Lost")
         follow = BYTE.read(body)
-        monitors = {
-            name: half.read(body) if follow & bit else rounded(last[name]) for name, bit in zip(MONITORS, FOLLOWS)
-        }
+        monitors = [
+            half.read(body) if follow & bit else rounded(at(last, path)) for path, bit in zip(MONITORS, FOLLOWS)
+        ]
         record = {
             "sequence": sequence,
             "tick": whole_tick,
@@ -594,7 +547,9 @@ class Replies:
             "answer": None,
             "events": events,
             "reading_failed": None,
-            **monitors,
+            "gains": {law: list(values) for law, values in last["gains"].items()},
+            "potentials_j": {law: list(values) for law, values in last["potentials_j"].items()},
+            "law_signals": {law: list(values) for law, values in last["law_signals"].items()},
             "cycles": 4 * cycles,
             "late_ticks": not_below(last["late_ticks"], late & 15, 4),
             "dropped": not_below(last["dropped"], late >> 4, 4),
@@ -603,6 +558,8 @@ class Replies:
             "torques_nm": [],
             "limiting": [0] * len(last["limiting"]),
         }
+        for (*path, last_step), value in zip(MONITORS, monitors):
+            at(record, path)[last_step] = value
         for bit, part in [(16, "fault"), (32, "reading_failed")]:
             if parts & bit:
                 fault, joint = Known(FAULTS).read(body), BYTE.read(body)
@@ -619,7 +576,7 @@ class Replies:
         if body.at < len(body.data):
             raise Malformed("there are bytes after the record")
         numbers = [record[part] for part in ("sequence", "tick", "late_ticks", "dropped", "decimation")]
-        law = [half_bits(value) for value in monitors.values()]
+        law = [half_bits(value) for value in monitors]
         if mix(numbers + law + record["counts"]) >> 24 != check:
             self.lost = True
             raise Unusable("Lost")
@@ -955,9 +912,9 @@ def run_pil(session, args, out):
     if image["joint_count"] != args.joints:
         raise Trouble(f"the hand `{image['hand']}` has {image['joint_count']} joints: tell so with --joints")
     period_s = image["period_us"] * 1e-6
-    gains = {"force_n": args.force, "attitude_stiffness_nm": None, "integral_gain_nm_rad": None}
+    gains = wanted_gains({"force_n": args.force})
     at = {part: round(args.ticks * share) for part, share in [("grasp", 0.1), ("release", 0.5), ("end", 0.95)]}
-    script = {3: "Arm", at["grasp"]: {"Grasp": gains}, at["release"]: "Release"}
+    script = {3: "Arm", at["grasp"]: {"Grasp": {"gains": gains}}, at["release"]: "Release"}
     script[at["end"]] = "Disarm"
     modes, largest_nm = [], {mode: 0.0 for mode in MODES}
     for tick in range(args.ticks):
@@ -989,14 +946,17 @@ def run_pil(session, args, out):
 def csv_line(record):
     fault = record["fault"] or {"fault": 0, "joint": None}
     head = [record[name] for name in ("sequence", "tick", "mode")] + [fault["fault"], fault["joint"], record["events"]]
-    head += [record[name] for name in MONITORS + ["cycles", "late_ticks", "dropped", "decimation"]]
+    head += [at(record, path) for path in MONITORS]
+    head += [record[name] for name in ("cycles", "late_ticks", "dropped", "decimation")]
     cells = head + record["counts"] + record["torques_nm"] + record["limiting"]
     return ",".join("" if cell is None else f"{cell:.9g}" if isinstance(cell, float) else str(cell) for cell in cells)
 
 
 def csv_head(record):
-    names = ["sequence", "tick", "mode", "fault", "fault_joint", "events"] + MONITORS
-    names += ["cycles", "late_ticks", "dropped", "decimation"]
+    names = ["sequence", "tick", "mode", "fault", "fault_joint", "events"]
+    tables = [GAINS, POTENTIALS, LAW_SIGNALS]
+    names += [name for table in tables for of_law in table.values() for name in of_law]
+    names += ["work_j", "damped_j", "excess_j", "cycles", "late_ticks", "dropped", "decimation"]
     parts = [("counts", "count_{}"), ("torques_nm", "torque_{}_nm"), ("limiting", "limiting_{}")]
     return ",".join(names + [name.format(k) for part, name in parts for k in range(len(record[part]))])
 
@@ -1016,20 +976,36 @@ class Printer:
         elif self.told is None or record["mode"] != self.told["mode"] or record["tick"] - self.told["tick"] >= 500:
             fault = "" if record["fault"] is None else ", " + told_fault(record["fault"])
             torque_nm = max(map(abs, record["torques_nm"]), default=0.0)
-            words = f"force {record['force_n']:.3g} N, largest torque {torque_nm:.3g} N m"
+            words = f"{told_gains(record)}, largest torque {torque_nm:.3g} N m"
             print(f"tick {record['tick']}: {record['mode']}{fault}; {words}", file=self.out)
             self.told = record
+
+
+def wanted_gains(wanted):
+    """Gains by their names, for a grasp; None as configured."""
+    return {law: [wanted.get(name) for name in names] for law, names in GAINS.items()}
+
+
+def told_gains(record):
+    told = [(name, value) for law, names in GAINS.items() for name, value in zip(names, record["gains"][law])]
+    return ", ".join(f"{name} {value:.3g}" for name, value in told if value)
 
 
 def parameter(text):
     """`limits.torque_nm[3]` to its name on the wire and index."""
     key, _, index = text.partition("[")
-    names = {known: name for name, known in PARAMETERS.items()}
-    if key not in names:
-        raise BadInput(f"there is no parameter {key}; there are {', '.join(names)}")
+    if key not in PARAMETERS:
+        raise BadInput(f"there is no parameter {key}; there are {', '.join(PARAMETERS)}")
     if index and not (index[-1] == "]" and index[:-1].isdecimal() and int(index[:-1]) < 256):
         raise BadInput(f"{text}: an index is a number in brackets, as in {key}[0]")
-    return {"parameter": names[key], "index": int(index[:-1] or 0) if index else 0}
+    return {"parameter": PARAMETERS.index(key), "index": int(index[:-1] or 0) if index else 0}
+
+
+def gain_value(text):
+    name, _, value = text.partition("=")
+    if not any(name in of_law for of_law in GAINS.values()):
+        raise argparse.ArgumentTypeError(f"{name} is no gain")
+    return name, finite(value)
 
 
 def finite(text):
@@ -1045,8 +1021,7 @@ def run_grasp(session, args):
     session.telemetry(args.decimation, args.signals)
     try:
         session.command("Arm")
-        gains = {"attitude_stiffness_nm": args.stiffness, "integral_gain_nm_rad": args.integral}
-        session.command({"Grasp": {"force_n": args.force, **gains}})
+        session.command({"Grasp": {"gains": wanted_gains(dict(args.gain, force_n=args.force))}})
         if session.pump(args.hold, lambda: state() == "Fault"):
             raise Trouble(told_fault(session.last_record["fault"]))
         session.command("Release")
@@ -1088,7 +1063,7 @@ def run(args, out):
     if args.command == "info":
         print(json.dumps(identity, indent=2), file=out)
     elif args.command == "get":
-        print(session.ask({"GetParameter": settings[0]})["Value"]["value"], file=out)
+        print(session.ask({"GetParameter": settings[0]})["Value"]["setting"]["value"], file=out)
     elif args.command == "set":
         session.ask({"SetParameter": {**settings[0], "value": args.value}})
     elif args.command == "clear":
@@ -1200,8 +1175,9 @@ def arguments():
     command("burst", "print the records around the last fault").add_argument("--csv", action="store_true")
     grasp = command("grasp", "arm, grasp, hold, release, disarm", True)
     grasp.add_argument("--force", type=finite, help="N; as configured if left out")
-    grasp.add_argument("--stiffness", type=finite, help="of the relative attitudes, N m; as configured if left out")
-    grasp.add_argument("--integral", type=finite, help="gain of the earlier law, N m/rad; as configured if left out")
+    names = [name for of_law in GAINS.values() for name in of_law]
+    gain = {"type": gain_value, "metavar": "NAME=VALUE", "action": "append", "default": []}
+    grasp.add_argument("--gain", **gain, help=f"{', '.join(names)}; as configured if left out")
     grasp.add_argument("--hold", type=finite, default=5.0, help="seconds")
     pil = command("pil", "be the joints of the image `pil`: springs with dampers, in lockstep")
     pil.add_argument("--image", help="start this image in QEMU, instead of --port")

@@ -361,6 +361,9 @@ macro_rules! signals {
             /// Bytes that suffice for every record of up to `J` joints (`J` below 16,384).
             pub const MOST_BYTES: usize = 0 $(+ <$type as Field>::MOST_BYTES)*;
 
+            /// Names and types of the fields, in the order of their bytes.
+            pub const FIELDS: &[(&str, &str)] = &[$((stringify!($field), stringify!($type))),*];
+
             /// Tells each signal with its value, in the order of the table.
             pub fn tell<'a>(&'a self, mut to: impl FnMut(Told<'a>)) {
                 $(self.$field.tell($named, &mut to);)*

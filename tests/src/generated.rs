@@ -47,3 +47,20 @@ pub fn check(document: &str, name: &str, text: &str) {
          look at the difference"
     );
 }
+
+/// Compares a file with what it has to be. With `BLINDGRASP_BLESS=1` in the environment it is written instead.
+///
+/// # Panics
+/// If it is something else.
+pub fn check_file(path: &str, text: &str) {
+    let there = std::fs::read_to_string(root().join(path)).unwrap_or_default();
+    if there == text {
+        return;
+    }
+    if std::env::var("BLINDGRASP_BLESS").is_ok_and(|bless| bless == "1") {
+        std::fs::write(root().join(path), text).unwrap_or_else(|error| panic!("{path}: {error}"));
+        return;
+    }
+    let differ = text.lines().zip(there.lines()).find(|(new, old)| new != old);
+    panic!("{path} is not what the code does:\n{differ:#?}\nrun this test with BLINDGRASP_BLESS=1");
+}

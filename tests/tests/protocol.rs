@@ -7,8 +7,7 @@
 use blindgrasp::MAX_JOINTS;
 use blindgrasp::scene::HandModel;
 use blindgrasp_shared::command::{Answer, Command, Grasp, Refusal};
-use blindgrasp_shared::control::PerGain;
-use blindgrasp_shared::control::{GAINS, PerSignal, Signal};
+use blindgrasp_shared::control::{GAINS, Gain, LAWS, PerGain, PerSignal, SIGNALS, Signal};
 use blindgrasp_shared::event::{Event, Events};
 use blindgrasp_shared::fault::{Fault, Raised, Reaction};
 use blindgrasp_shared::identity::{Clock, Crash, CrashKind, Identity, Image, ResetCause, UNITS};
@@ -21,7 +20,7 @@ use blindgrasp_shared::supervisor::{Event as ModeEvent, Mode, Outcome, outcome};
 use blindgrasp_shared::telemetry::snapshot::{PART_BYTES, Part};
 use blindgrasp_shared::telemetry::{INTERFACE_VERSION, List, Record, dense};
 use blindgrasp_shared::tick::{Input, Params, State, tick};
-use blindgrasp_tests::generated::{check, table};
+use blindgrasp_tests::generated::{check, check_file, table};
 use blindgrasp_tests::images::root;
 use serde::ser::{Serialize, SerializeTuple, Serializer};
 use serde_json::json;
@@ -717,6 +716,33 @@ fn the_tables_of_the_document_are_those_of_the_code() {
         let Signal { key, unit, words } = told.signal;
         signals.push([format!("`{key}`"), each.into(), unit.into(), words.into()]);
     });
+    let record: Vec<[String; 2]> = AnyRecord::FIELDS
+        .iter()
+        .map(|(name, kind)| {
+            let kind = match *kind {
+                "Mode" => "mode",
+                "Option<Raised>" => "`option raised`",
+                "Option<Answer>" => "option of `command` and `refused: option refusal`",
+                "Events" => "events",
+                "PerGain<f32>" => "`f32` for each gain of each law, without their number",
+                "PerSignal<f32>" => "`f32` for each other signal of each law, without their number",
+                "List<i32, J>" => "`list i32`: a joint each, or none",
+                "List<f32, J>" => "`list f32`: a joint each, or none",
+                "List<Limiting, J>" => "`list u8`: limits, a joint each, or none",
+                number => return [format!("`{name}`"), format!("`{number}`")],
+            };
+            [format!("`{name}`"), kind.to_owned()]
+        })
+        .collect();
+    check(DOCUMENT, "record", &table(["field", "type"], &record));
+    let gains: Vec<[String; 5]> = (GAINS.iter().zip(PerGain::LAW.iter()))
+        .map(|(gain, &law)| {
+            let law = LAWS[usize::from(law)].0;
+            let (key, potential) = (format!("`{}`", gain.key), format!("`{}`", gain.potential.key));
+            [format!("`{law}`"), key, gain.unit.into(), potential, gain.words.into()]
+        })
+        .collect();
+    check(DOCUMENT, "gains", &table(["law", "gain", "unit", "potential", "meaning"], &gains));
     check(DOCUMENT, "signals", &table(["signal", "of each", "unit", "meaning"], &signals));
     let bits: Vec<[String; 2]> =
         Limit::ALL.map(|limit| [(limit as u8).to_string(), limit.words().to_owned()]).into();
@@ -737,6 +763,61 @@ fn the_tables_of_the_document_are_those_of_the_code() {
         ResetCause::Unknown,
     ];
     check(DOCUMENT, "resets", &table(three, &numbered(&causes, |cause| cause.words())));
+}
+
+/// The tables of the Python client, written from those of the code.
+#[test]
+fn the_tables_of_the_client_are_those_of_the_code() {
+    let text = |words: &str| json!(words).to_string();
+    let list = |names: &[&str]| names.iter().map(|name| text(name)).collect::<Vec<_>>().join(", ");
+    let mut module = String::from(
+        "\"\"\"Vocabulary of the wire, written by tests/tests/protocol.rs from the tables of the firmware.\"\"\"\n\n",
+    );
+    let _ = writeln!(module, "INTERFACE_VERSION = {INTERFACE_VERSION}");
+    let mut dictionary = |name: &str, rows: Vec<(String, String)>| {
+        let _ = writeln!(module, "{name} = {{");
+        for (key, value) in rows {
+            let _ = writeln!(module, "    {key}: {value},");
+        }
+        let _ = writeln!(module, "}}");
+    };
+    dictionary(
+        "FAULTS",
+        Fault::ALL.iter().map(|fault| (fault.number().to_string(), text(fault.words()))).collect(),
+    );
+    dictionary("REFUSALS", Refusal::ALL.iter().map(|r| (text(&format!("{r:?}")), text(r.words()))).collect());
+    dictionary("EVENTS", Event::ALL.map(|event| (text(event.key()), (event as u8).to_string())).into());
+    dictionary("LIMITS", Limit::ALL.map(|limit| (text(limit.key()), (limit as u8).to_string())).into());
+    let per_law = |keys: &[(u8, &str)]| {
+        let of = |law: u8| keys.iter().filter(|(of, _)| *of == law).map(|(_, key)| *key).collect::<Vec<_>>();
+        let row = |(law, (name, _)): (u8, &(&str, &str))| (text(name), format!("[{}]", list(&of(law))));
+        (0..).zip(LAWS).map(row).collect::<Vec<_>>()
+    };
+    let gains = |key: fn(&Gain) -> &'static str| {
+        PerGain::LAW.iter().copied().zip(GAINS.iter().map(key)).collect::<Vec<_>>()
+    };
+    dictionary("GAINS", per_law(&gains(|gain| gain.key)));
+    dictionary("POTENTIALS", per_law(&gains(|gain| gain.potential.key)));
+    dictionary(
+        "LAW_SIGNALS",
+        per_law(&PerSignal::LAW.iter().copied().zip(SIGNALS.iter().map(|s| s.key)).collect::<Vec<_>>()),
+    );
+    let modes = Mode::ALL.map(|mode| format!("{mode:?}"));
+    let modes = modes.iter().map(String::as_str).collect::<Vec<_>>();
+    let _ = writeln!(module, "MODES = [{}]", list(&modes));
+    let _ = writeln!(module, "# By their numbers.\nPARAMETERS = [");
+    for parameter in Parameter::ALL {
+        let _ = writeln!(module, "    {},", text(&parameter.to_string()));
+    }
+    let _ = writeln!(
+        module,
+        "]\n# Names and types of a record's fields, in the order of their bytes.\nRECORD_FIELDS = ["
+    );
+    for (name, kind) in AnyRecord::FIELDS {
+        let _ = writeln!(module, "    ({}, {}),", text(name), text(kind));
+    }
+    module += "]\n";
+    check_file("examples/python/blindgrasp_tables.py", &module);
 }
 
 #[test]

@@ -199,6 +199,16 @@ macro_rules! laws {
             };
         }
 
+        impl PerSignal<u8> {
+            /// The number of the law that each signal belongs to.
+            pub const LAW: Self = {
+                let mut next = 0;
+                $(let $law = next; next += 1;)*
+                let _ = next;
+                Self { $($law: [$law; $law::SIGNALS.len()],)* }
+            };
+        }
+
         /// What the laws remember from the moment in which a grasp began.
         #[derive(Clone, Copy, Debug, PartialEq)]
         pub struct Latch<T, const J: usize, const F: usize> {
