@@ -1,8 +1,10 @@
 //! Every shipped hand holds something, and where joints have friction it comes to rest with the forces of Eq. 57.
 
+use blindgrasp::scene::file::{Safety, SafetyKey};
 use blindgrasp::scene::{HandFile, Scene};
 use blindgrasp::sim::{Run, Simulation};
 use blindgrasp::{MAX_JOINTS, Posture};
+use blindgrasp_tests::generated;
 
 /// Scenes that are there to show how an object is lost.
 const LOST_ON_PURPOSE: [&str; 2] = ["cube-normal-only", "hand-arm-normal-only"];
@@ -118,4 +120,23 @@ fn the_new_hands_hold_under_other_conditions() {
             assert!(summary.settle_time_s.is_some_and(|t_s| t_s < 2.0), "{name}, {setting}: {summary:?}");
         }
     }
+}
+
+#[test]
+fn the_document_has_the_safety_numbers() {
+    let row = |key: &SafetyKey| {
+        let parameters: Vec<String> = key.parameters.iter().map(|name| format!("`{name}`")).collect();
+        [
+            format!("`{}`", key.name),
+            key.default.to_owned(),
+            format!("{} to {}", key.least, key.most),
+            key.what.to_owned(),
+            key.choice.to_owned(),
+            parameters.join(", "),
+        ]
+    };
+    let rows: Vec<[String; 6]> = Safety::KEYS.iter().map(row).collect();
+    let head =
+        ["key", "unless given", "range", "what, and what it protects from", "how to choose it", "becomes"];
+    generated::check("docs/hands.md", "safety", &generated::table(head, &rows));
 }

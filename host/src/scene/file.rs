@@ -6,10 +6,12 @@
 mod control;
 mod object;
 mod push;
+mod safety;
 
 pub use control::Control;
 pub use object::{ObjectFile, ShapeFile};
 pub use push::PushFile;
+pub use safety::{Safety, SafetyKey};
 
 use serde::{Deserialize, Deserializer, Serialize, Serializer, de};
 use std::collections::BTreeMap;
@@ -177,8 +179,8 @@ pub struct Actuators {
     /// Whether the torque limits of the hand's joints apply.
     #[serde(default = "yes")]
     pub torque_limits: bool,
-    /// The fastest that a torque may change, N m/s; without it, a joint's whole torque within 10 ms, if torque limits
-    /// apply.
+    /// The fastest that a torque may change, N m/s; without it, a joint's whole torque within the hand's
+    /// `safety.slew_s`, if torque limits apply.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub slew_limit_nm_s: Option<f64>,
 }
@@ -263,6 +265,9 @@ pub struct HandFile {
     /// The gains of its firmware. A scene has its own.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub control: Option<Control>,
+    /// Its safety numbers, in its firmware and in scenes.
+    #[serde(default)]
+    pub safety: Safety,
     /// The joints, each after its parent. In a file, keys of `[joint_defaults]` stand for those that a joint leaves out.
     #[serde(rename = "joint")]
     pub joints: Vec<JointFile>,

@@ -4,7 +4,7 @@ use super::{
     JointParameters,
     check::{Result, all_within, distinct, fail, item, within},
     error::{SceneError, suggestion},
-    file::{FingertipFile, HandFile, JointFile, SceneFile},
+    file::{FingertipFile, HandFile, JointFile, Safety, SceneFile},
     object::{breaks_triangle, tensor},
 };
 use crate::plant::contact::FingertipModel;
@@ -19,6 +19,7 @@ use nalgebra::{DMatrix, Quaternion, SymmetricEigen, UnitQuaternion, Vector3};
 /// Checks a hand and prepares it.
 pub(super) fn hand(file: &HandFile, warnings: &mut Vec<String>) -> Result<Hand> {
     let tree = tree(file)?;
+    check_safety(&file.safety)?;
     for (k, joint) in file.joints.iter().enumerate() {
         let key = |name: &str| item("hand.joint", k, name);
         check_joint(joint, &key)?;
@@ -113,6 +114,19 @@ fn prepare(file: &HandFile, tree: &Tree) -> Result<Hand> {
         .map(|(tip, &link)| Fingertip { link, offset_m: tip.offset_m.into(), radius_m: tip.radius_m })
         .collect();
     Hand::new(&joints, &fingertips).map_err(|error| hand_error(file, error))
+}
+
+fn check_safety(safety: &Safety) -> Result<()> {
+    for (key, value) in safety.values() {
+        if !(value >= key.least && value <= key.most) {
+            return fail(
+                format!("hand.safety.{}", key.name),
+                format!("{value} is out of range"),
+                format!("has to be between {} and {}; {} unless given", key.least, key.most, key.default),
+            );
+        }
+    }
+    Ok(())
 }
 
 fn check_fingertip(fingertip: &FingertipFile, key: &dyn Fn(&str) -> String) -> Result<()> {

@@ -15,13 +15,8 @@ use crate::{Hand, MAX_JOINTS};
 use blindgrasp_shared::tick::{Config, Params};
 use std::path::{Path, PathBuf};
 
-/// How long the host's heartbeat may fail while the hand has torque, ms.
-const HEARTBEAT_MS: u32 = 250;
-/// How many ticks in a row may be late.
-const LATE_TICKS: u32 = 3;
-
-/// A hand, checked, with the configuration that its file asks for: the gains of `[control]`, and all limits and faults that
-/// a real hand has. Gravity is along `-z` of the base: the palm looks up.
+/// A hand, checked, with the configuration that its file asks for: the gains of `[control]`, the numbers of `[safety]`, and all
+/// limits and faults that a real hand has. Gravity is along `-z` of the base: the palm looks up.
 #[derive(Clone, Debug, PartialEq)]
 pub struct HandModel {
     /// Its name.
@@ -109,13 +104,14 @@ impl HandModel {
         let setup = Setup {
             joints: &file.joints,
             control: gains,
+            safety: &file.safety,
             sensors: &Sensors::default(),
             actuators: &Actuators::default(),
             gravity_m_s2: PlantSettings::default().gravity_m_s2,
         };
         let mut config = setup.config();
-        config.faults.heartbeat_ms = Some(HEARTBEAT_MS);
-        config.faults.late_ticks = Some(LATE_TICKS);
+        config.faults.heartbeat_ms = Some(file.safety.heartbeat_ms);
+        config.faults.late_ticks = Some(file.safety.late_ticks);
         // What is in range in f64 may not be in f32.
         if let Err(error) = Params::new(hand.cast::<f32>(), &config) {
             return fail("control", format!("the controller refuses it: {error}"), "");

@@ -46,7 +46,9 @@ pub use draft::Draft;
 pub use equilibrium::equilibrium_indentations;
 pub(crate) use error::one_line;
 pub use error::{Notice, Place, SceneError, suggestion};
-pub use file::{Actuators, Control, Friction, HandFile, ObjectFile, PlantSettings, SceneFile, Sensors};
+pub use file::{
+    Actuators, Control, Friction, HandFile, ObjectFile, PlantSettings, Safety, SceneFile, Sensors,
+};
 pub(crate) use hand::{moving_masses, posture};
 pub use hand_model::HandModel;
 pub use library::is_of_files;
@@ -213,6 +215,7 @@ impl Scene {
         Setup {
             joints: &self.file.hand.joints,
             control: &self.control,
+            safety: &self.file.hand.safety,
             sensors: &self.sensors,
             actuators: &self.actuators,
             gravity_m_s2: self.plant.gravity_m_s2,

@@ -6,7 +6,7 @@
 use super::rules::numbers::direction;
 use crate::Hand;
 use crate::scene::file::{FingertipFile, InertiaFile, JointFile, SCHEMA};
-use crate::scene::{Control, HandFile, SceneError};
+use crate::scene::{Control, HandFile, Safety, SceneError};
 use std::collections::BTreeSet;
 use std::f64::consts::PI;
 
@@ -47,21 +47,25 @@ fn mend_numbers(file: &mut HandFile, accept: Accept) -> Vec<SceneError> {
     errors
 }
 
-/// Format, name and gains.
+/// Format, name, gains and safety numbers.
 fn mend_head(file: &mut HandFile, accept: Accept) -> Vec<SceneError> {
     let mut head = HandFile {
         schema: file.schema,
         name: file.name.clone(),
         control: file.control.clone(),
+        safety: file.safety.clone(),
         ..around_joint(&sound_joint())
     };
     let errors = mend(&mut head, accept, |head, key| match key {
         "schema" => head.schema = SCHEMA,
         "name" => head.name = "hand".into(),
-        _ => head.control.iter_mut().for_each(|control| mend_control(control, key)),
+        _ => {
+            head.safety.reset(key);
+            head.control.iter_mut().for_each(|control| mend_control(control, key));
+        }
     });
-    (file.schema, file.control) = (head.schema, head.control);
-    file.name = head.name;
+    (file.schema, file.name) = (head.schema, head.name);
+    (file.control, file.safety) = (head.control, head.safety);
     errors
 }
 
@@ -132,6 +136,7 @@ fn around_joint(joint: &JointFile) -> HandFile {
         name: "hand".into(),
         description: String::new(),
         control: None,
+        safety: Safety::default(),
         joints: vec![JointFile { parent: None, ..joint.clone() }],
         fingertips: vec![on_it("1"), on_it("2")],
     }

@@ -1,7 +1,7 @@
 //! Hands without a scene: what a firmware is built with, and what is said of a file that it can't be built with.
 
 use super::*;
-use crate::scene::HandModel;
+use crate::scene::{HandModel, Safety};
 
 fn hand_text() -> &'static str {
     Kind::Hand.built_in().iter().find(|(name, _)| *name == "three-finger").unwrap().1
@@ -58,6 +58,50 @@ fn a_model_has_the_configuration_of_its_experiments() {
         expected.faults.late_ticks = Some(3);
         assert_eq!(model.config, expected);
     }
+}
+
+/// Every key of `[safety]` does something to what a firmware is built with, is refused beyond its range, and has a default
+/// within it; the text that `hand new` writes is that of the defaults.
+#[test]
+fn safety_numbers_come_from_the_file() {
+    let with = |lines: &str| {
+        hand_text().replacen("[joint_defaults]", &format!("[safety]\n{lines}\n[joint_defaults]"), 1)
+    };
+    let built_in = HandModel::load("three-finger").unwrap();
+    let written: Vec<String> =
+        Safety::KEYS.iter().map(|key| format!("{} = {}", key.name, key.default)).collect();
+    assert_eq!(HandModel::parse(&with(&written.join("\n")), "h").unwrap(), built_in);
+    for key in Safety::KEYS {
+        let default: f64 = key.default.parse().unwrap();
+        assert!((key.least..=key.most).contains(&default), "{}", key.name);
+        for (value, refused) in
+            [(key.least, false), (key.most, false), (key.least - 1.0, true), (key.most + 1.0, true)]
+        {
+            match HandModel::parse(&with(&format!("{} = {value}", key.name)), "h") {
+                Ok(model) => {
+                    assert!(!refused, "{} = {value}", key.name);
+                    assert_ne!(model.config, built_in.config, "{} = {value}", key.name);
+                }
+                Err(error) => {
+                    assert!(refused, "{error}");
+                    assert_eq!(error.key, format!("safety.{}", key.name));
+                    assert_eq!(error.place.unwrap().line, line("[joint_defaults]") + 1);
+                }
+            }
+        }
+    }
+}
+
+/// A scene's controller has the hand's safety numbers, and so has what is written of a run.
+#[test]
+fn safety_numbers_act_in_a_scene_and_are_written_out() {
+    let usual = load("cube", &[]).unwrap();
+    let slower = load("cube", &["hand.safety.slew_s=0.02"]).unwrap();
+    let slew = |scene: &Scene| scene.controller_config().limits.slew_nm_s.unwrap()[0];
+    assert_eq!(slew(&slower), slew(&usual) / 2.0);
+    let text = slower.effective_toml();
+    assert_eq!(Safety::KEYS.iter().filter(|key| text.contains(&format!("\n{} = ", key.name))).count(), 15);
+    assert_eq!(Scene::parse(&text, "again", Path::new(""), &[]).unwrap(), slower);
 }
 
 /// What a firmware is built with: the earlier law, if the hand's file asks for it.

@@ -303,6 +303,8 @@ fn scenes_built_in_code_refuse_numbers_that_are_none() {
         |s| &mut s.pose.rotation_rpy_rad.as_mut().unwrap()[0],
         |s| &mut s.contacts[0].point_m.as_mut().unwrap()[2],
         |s| s.object.mass_kg.as_mut().unwrap(),
+        |s| &mut s.hand.safety.slew_s,
+        |s| &mut s.hand.safety.energy_travel_rad,
         |s| &mut s.hand.joints[1].offset_m[0],
         |s| &mut s.hand.joints[1].rotation_rpy_rad[0],
         |s| &mut s.hand.joints[1].axis[0],

@@ -111,7 +111,8 @@ fn gyration(specimen: &Specimen, k: usize, most: f64, found: &mut Found) {
         return;
     }
     let mass_kg = specimen.hand.link(k).mass_kg;
-    let radius = (most / mass_kg).square_root();
+    // The roots first: the mass may be the smallest of all numbers.
+    let radius = most.square_root() / mass_kg.square_root();
     let size = size_m(specimen, k, &specimen.file.joints[k].mass_centre_m.into());
     if !(size > 0.0) {
         return;

@@ -154,8 +154,10 @@ pub(in super::super) fn subject_of(file: &HandFile, key: &str) -> String {
     };
     match name {
         Some((list, name)) => format!("{list} `{name}`"),
-        None if list == Some("control") => "[control]".to_owned(),
-        None => String::new(),
+        None => match list {
+            Some(table @ ("control" | "safety")) => format!("[{table}]"),
+            _ => String::new(),
+        },
     }
 }
 

@@ -29,6 +29,11 @@ fn numbers(file: &mut HandFile) -> Vec<&mut f64> {
         all.extend(control.gains.grasp.iter_mut().chain([&mut control.damping_scale]));
         all.extend([&mut control.period_s, &mut control.soft_start_s, &mut control.estimator_bandwidth_hz]);
     }
+    all.extend([
+        &mut file.safety.slew_s,
+        &mut file.safety.stop_margin_rad,
+        &mut file.safety.stop_torque_share,
+    ]);
     for joint in &mut file.joints {
         all.extend(joint.offset_m.iter_mut().chain(&mut joint.rotation_rpy_rad).chain(&mut joint.axis));
         all.extend(

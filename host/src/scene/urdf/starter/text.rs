@@ -2,7 +2,7 @@
 
 use super::super::super::check::{LONGEST_NAME, Result};
 use super::super::super::error::SceneError;
-use super::super::super::file::SCHEMA;
+use super::super::super::file::{SCHEMA, Safety};
 use super::super::assembly::{Assembly, MOST_NAMES, resting, toml_key};
 use super::super::complete::PLACEHOLDER;
 use super::super::keys::Keys;
@@ -184,6 +184,7 @@ impl<'a> Draft<'a> {
         for i in 0..self.tips.len() {
             self.write_fingertip(&mut text, gains, i);
         }
+        write_safety(&mut text);
         text
     }
 
@@ -318,5 +319,17 @@ impl<'a> Draft<'a> {
             format_args!("{:e}", gains.stiffnesses_n_m2[i]),
             gains::INDENTATION,
         );
+    }
+}
+
+/// All keys of `[safety]` with their defaults.
+fn write_safety(text: &mut String) {
+    let _ = write!(
+        text,
+        "\n# Of firmware and scenes; these are the defaults. docs/hands.md says how each is chosen.\n[safety]\n"
+    );
+    for key in Safety::KEYS {
+        let value = format!("{} = {}", key.name, key.default);
+        let _ = writeln!(text, "{value:<31} # {}", key.what);
     }
 }
