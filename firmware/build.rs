@@ -5,6 +5,7 @@
 //!
 //! - `JOINTS`, `FINGERS`: its exact sizes;
 //! - `HAND`, `CONFIG`: kinematics and configuration, which the simulation would use too, to the bit;
+//! - `TORQUES_PER_VOLT_NM_V`: scales and signs of the outputs;
 //! - `IMAGE_HAND`, `IMAGE_PIL`: what the two images say of themselves (`blindgrasp_shared::identity::Image`), so that
 //!   a host knows before it flashes, and on a running hand, for which hand and from which sources an image was built.
 //!

@@ -1,4 +1,4 @@
-//! The board: every pin, clock and scale of it, with the arithmetic.
+//! The board: every pin and clock of it, with the arithmetic. The scales of the outputs are the hand's.
 //!
 //! STM32F405RG in LQFP64. Not to be used: PA13 and PA14 (debugger), PH0 and PH1 (crystal), PB2 (boot), PC14 and PC15
 //! (weak pins of the slow crystal).
@@ -24,7 +24,7 @@ use crate::capacity::MOST_JOINTS;
 use crate::joints::dac::{self, CHANNELS};
 use crate::joints::ls7366r::{self, FilterClock};
 use crate::joints::{BoardJoints, JointsConfig, OutputConfig};
-use crate::model::JOINTS;
+use crate::model::{JOINTS, TORQUES_PER_VOLT_NM_V};
 use crate::serial::LinePins;
 use core::array;
 use core::convert::Infallible;
@@ -67,10 +67,6 @@ const DAC_CLOCK: Hertz = Hertz::kHz(5_250);
 /// is 159 kHz at the 1,000 rad/s that the motors can do, with 1,000 lines a turn: half of the oscillator, 10 MHz, is
 /// plenty.
 const FILTER_CLOCK: FilterClock = FilterClock::Half;
-
-/// Torque at a joint for each volt at its amplifier: 1.1 A/V of the amplifier, 23.4 mN m/A of the motor, gear 5.4 to 1.
-/// 10 V are then 1.39 N m, the most that the motor can do (hand file: 1.3878 N m).
-const NM_PER_VOLT: f32 = 1.1 * 23.4e-3 * 5.4;
 
 const MOST_DACS: usize = MOST_JOINTS / CHANNELS;
 /// DACs that this hand needs.
@@ -224,10 +220,9 @@ pub fn joints(
     let counters = array::from_fn(|_| Device::new(counters, selects.next().expect(ENOUGH), Wait));
     let mut selects = pins.dacs.into_iter();
     let dacs = array::from_fn(|_| Device::new(dacs, selects.next().expect(ENOUGH), Wait));
-    let outputs = [OutputConfig { nm_per_volt: NM_PER_VOLT }; JOINTS];
+    let outputs = TORQUES_PER_VOLT_NM_V.map(|nm_per_volt| OutputConfig { nm_per_volt });
     let config = JointsConfig { filter_clock: FILTER_CLOCK, outputs };
-    HandJoints::new(counters, dacs, pins.enable, &config)
-        .expect("the numbers in this file are those of a board")
+    HandJoints::new(counters, dacs, pins.enable, &config).expect("the build has checked the hand's scales")
 }
 
 const ENOUGH: &str = "checked when compiled: the board has enough selects";

@@ -140,3 +140,37 @@ fn the_document_has_the_safety_numbers() {
         ["key", "unless given", "range", "what, and what it protects from", "how to choose it", "becomes"];
     generated::check("docs/hands.md", "safety", &generated::table(head, &rows));
 }
+
+/// Encoders that count the other way, from anywhere, next to where a counter wraps too, and motors the wrong way round: the
+/// very same grasp, once the hand's file says so.
+#[test]
+fn signs_and_zeros_of_the_file_make_the_same_grasp() {
+    let compare = |scene: &str, usual: &[&str], settings: &[&str]| {
+        let (usual, other) = (load(scene, usual), load(scene, &[usual, settings].concat()));
+        let (usual, other) = (run(&usual), run(&other));
+        assert!(usual.summary.grasp_held, "{scene}");
+        assert_eq!(usual.samples.len(), other.samples.len(), "{scene}");
+        for (usual, other) in usual.samples.iter().zip(&other.samples) {
+            let bits = |torques: &[f64]| torques.iter().map(|torque| torque.to_bits()).collect::<Vec<_>>();
+            assert_eq!(bits(&usual.torques_nm), bits(&other.torques_nm), "{scene}, {} s", usual.t_s);
+            assert_eq!(usual, other, "{scene}");
+        }
+    };
+    let all_reversed = ["hand.joint.*.encoder_reversed=true", "hand.joint.*.motor_reversed=true"];
+    let zeros = [
+        "hand.joint.*.encoder_zero_count=-12345",
+        "hand.joint.2.encoder_zero_count=2147483647",
+        "hand.joint.3.encoder_zero_count=-2147483648",
+        "hand.joint.3.encoder_reversed=true",
+    ];
+    let noise = ["sensors.noise_counts=1", "duration_s=1"];
+    for usual in [&["duration_s=2"][..], &noise] {
+        compare("cube", usual, &all_reversed);
+        compare("cube", usual, &zeros);
+        compare("prism", usual, &[&all_reversed[..], &zeros].concat());
+    }
+    // It matters: a controller whose file does not say so holds nothing.
+    let mut wrong = load("cube", &["hand.joint.*.encoder_reversed=true", "duration_s=0.5"]);
+    wrong.file.hand = load("cube", &[]).file.hand;
+    assert!(!run(&wrong).summary.grasp_held);
+}

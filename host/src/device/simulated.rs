@@ -295,6 +295,30 @@ mod tests {
         }
     }
 
+    /// The device's own estimator undoes what the encoders do.
+    #[test]
+    fn a_reversed_hand_with_odd_zeros_does_the_same() {
+        let torques = |settings: &[&str]| {
+            let mut bench = Bench::new(settings);
+            bench.command(Command::Arm);
+            bench.command(Command::Grasp(Grasp::CONFIGURED));
+            let torques: Vec<_> = (0..500)
+                .map(|k| {
+                    let packet = (k % 50 == 0).then(|| {
+                        bench.sequence += 1;
+                        Packet { session: 1, sequence: bench.sequence, request: Request::Heartbeat }
+                    });
+                    bench.hand.turn(Turn { packet, ..Turn::default() }).0.torques_nm.map(f32::to_bits)
+                })
+                .collect();
+            (torques, bench.counts)
+        };
+        let odd = ["hand.joint.*.encoder_reversed=true", "hand.joint.*.encoder_zero_count=1000"];
+        let ((usual, counts), (other, turned)) = (torques(&[]), torques(&odd));
+        assert_eq!(usual, other);
+        assert_eq!(turned, counts.iter().map(|count| 1000 - count).collect::<Vec<_>>());
+    }
+
     #[test]
     fn a_grasp_that_was_lost_is_not_begun_again_without_a_command() {
         let mut bench = Bench::new(&["friction.scale=0"]);

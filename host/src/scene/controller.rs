@@ -48,9 +48,9 @@ impl Setup<'_> {
                 bandwidth_hz: control.estimator_bandwidth_hz as f32,
                 encoders: std::array::from_fn(|k| {
                     self.joints.get(k).map_or(Encoder::default(), |joint| Encoder {
-                        zero_count: 0,
+                        zero_count: joint.encoder_zero_count,
                         rad_per_count: (TAU / joint.encoder_counts_per_turn) as f32,
-                        reversed: false,
+                        reversed: joint.encoder_reversed,
                     })
                 }),
             },

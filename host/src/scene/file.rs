@@ -316,6 +316,18 @@ pub struct JointFile {
     pub speed_limit_rad_s: f64,
     /// Encoder counts in one turn of the joint, all edges counted.
     pub encoder_counts_per_turn: f64,
+    /// Whether the count falls while the joint turns in its positive direction.
+    #[serde(default)]
+    pub encoder_reversed: bool,
+    /// The count at joint angle zero.
+    #[serde(default)]
+    pub encoder_zero_count: i32,
+    /// Whether a positive voltage at the amplifier pushes the joint in its negative direction.
+    #[serde(default)]
+    pub motor_reversed: bool,
+    /// Size of the torque at the joint for each volt at its amplifier, N m/V: amplifier (A/V) times motor (N m/A) times gear.
+    #[serde(default = "JointFile::torque_per_volt_nm_v")]
+    pub torque_per_volt_nm_v: f64,
     /// Viscous friction at the joint, N m s/rad.
     #[serde(default)]
     pub viscous_friction_nm_s_rad: f64,
@@ -333,6 +345,12 @@ pub struct JointFile {
 impl JointFile {
     fn presliding_rad() -> f64 {
         2e-4
+    }
+
+    /// Of the paper's motor: 1.1 A/V of its amplifier, 23.4 mN m/A, gear 5.4 to 1. 10 V are then 1.39 N m, the most that it
+    /// can do.
+    fn torque_per_volt_nm_v() -> f64 {
+        0.138996
     }
 }
 

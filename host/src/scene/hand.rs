@@ -157,6 +157,8 @@ fn check_joint(joint: &JointFile, key: &dyn Fn(&str) -> String) -> Result<()> {
     within(&key("torque_limit_nm"), joint.torque_limit_nm, 1e-9, 1e6)?;
     within(&key("speed_limit_rad_s"), joint.speed_limit_rad_s, 1e-6, 1e6)?;
     within(&key("encoder_counts_per_turn"), joint.encoder_counts_per_turn, 8.0, 1e9)?;
+    within(&key("torque_per_volt_nm_v"), joint.torque_per_volt_nm_v, 1e-6, 1e4)
+        .map_err(|error| SceneError { remedy: error.remedy + "; its sign is `motor_reversed`", ..error })?;
     within(&key("viscous_friction_nm_s_rad"), joint.viscous_friction_nm_s_rad, 0.0, 1e6)?;
     within(&key("coulomb_friction_nm"), joint.coulomb_friction_nm, 0.0, 1e6)?;
     within(&key("presliding_rad"), joint.presliding_rad, 1e-9, 1.0)?;
@@ -220,6 +222,8 @@ pub(super) fn joint_parameters(joint: &JointFile, file: &SceneFile) -> JointPara
         torque_limit_nm: if file.actuators.torque_limits { joint.torque_limit_nm } else { f64::INFINITY },
         speed_limit_rad_s: joint.speed_limit_rad_s,
         encoder_counts_per_turn: joint.encoder_counts_per_turn,
+        encoder_reversed: joint.encoder_reversed,
+        encoder_zero_count: joint.encoder_zero_count,
         friction: JointFriction {
             viscous_nm_s: joint.viscous_friction_nm_s_rad * friction,
             coulomb_nm: joint.coulomb_friction_nm * friction,

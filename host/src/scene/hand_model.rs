@@ -6,7 +6,7 @@ use super::{
     check::{Result, fail, name, schema},
     controller::Setup,
     error::{Notice, Place, SceneError},
-    file::{Actuators, HandFile, PlantSettings, Sensors},
+    file::{Actuators, HandFile, JointFile, PlantSettings, Sensors},
     hand::{hand, kinematics},
     library::{Document, Kind, is_path},
     source::{IMPORTS, Source, config_source},
@@ -27,6 +27,8 @@ pub struct HandModel {
     pub joint_names: Vec<String>,
     /// The controller's configuration; zero beyond the hand's joints.
     pub config: Config<MAX_JOINTS>,
+    /// Torque at each joint for each volt at its amplifier, N m/V; negative where the motor is reversed.
+    pub torques_per_volt_nm_v: Vec<f32>,
     /// What is odd but can be used, in words.
     pub warnings: Vec<String>,
 }
@@ -117,10 +119,16 @@ impl HandModel {
             return fail("control", format!("the controller refuses it: {error}"), "");
         }
         let joint_names = file.joints.iter().map(|joint| joint.name.clone()).collect();
-        Ok(Self { name: file.name.clone(), hand, joint_names, config, warnings })
+        let per_volt = |joint: &JointFile| {
+            let size = joint.torque_per_volt_nm_v as f32;
+            if joint.motor_reversed { -size } else { size }
+        };
+        let torques_per_volt_nm_v = file.joints.iter().map(per_volt).collect();
+        Ok(Self { name: file.name.clone(), hand, joint_names, config, torques_per_volt_nm_v, warnings })
     }
 
-    /// What the firmware is built with, as Rust source: the constants `JOINTS`, `FINGERS`, `HAND` and `CONFIG`. The same hand
+    /// What the firmware is built with, as Rust source: the constants `JOINTS`, `FINGERS`, `HAND`, `CONFIG`
+    /// and `TORQUES_PER_VOLT_NM_V`. The same hand
     /// gives the same text, wherever its file lies.
     pub fn source(&self) -> String {
         let hand = self.hand.cast::<f32>();
@@ -141,12 +149,16 @@ pub static HAND: Hand<f32, JOINTS, FINGERS> = match Hand::from_prepared({}, {}) 
 /// Its gains, limits and times.
 #[allow(clippy::approx_constant, clippy::excessive_precision)]
 pub static CONFIG: Config<JOINTS> = {};
+/// Torque at each joint for each volt at its amplifier, N m/V; negative where the motor is reversed.
+#[allow(clippy::approx_constant, clippy::excessive_precision)]
+pub static TORQUES_PER_VOLT_NM_V: [f32; JOINTS] = {};
 ",
             fingertips.len(),
             self.name,
             joints.source(count),
             fingertips.source(count),
             config_source(&self.config, count),
+            self.torques_per_volt_nm_v.source(count),
         )
     }
 }

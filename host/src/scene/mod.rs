@@ -142,6 +142,10 @@ pub struct JointParameters {
     pub speed_limit_rad_s: f64,
     /// Encoder counts in one turn of the joint.
     pub encoder_counts_per_turn: f64,
+    /// Whether the count falls while the joint turns in its positive direction.
+    pub encoder_reversed: bool,
+    /// The count at joint angle zero.
+    pub encoder_zero_count: i32,
     /// Friction, with the scene's factor.
     pub friction: JointFriction,
 }

@@ -23,6 +23,7 @@ impl de::Error for SceneError {
         let expected = match expected.to_string() {
             expected if expected == "f64" => "a number".into(),
             expected if expected == "u32" || expected == "usize" => "a whole number, not negative".into(),
+            expected if expected == "i32" => "a whole number between -2147483648 and 2147483647".into(),
             expected if expected.starts_with("struct ") || expected == "a map" => "a table".into(),
             expected if expected == "a sequence" => "a list".into(),
             expected if expected == "a boolean" => "true or false".into(),

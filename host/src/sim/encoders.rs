@@ -1,8 +1,10 @@
-//! The encoders of the joints: angles to counts, with noise if the scene asks for it.
+//! The encoders of the joints: angles to counts, each with the sign and the zero of the hand's file, and with noise if the scene
+//! asks for it.
 
 use crate::MAX_JOINTS;
 use crate::plant::dynamics::JointVector;
 use crate::scene::Scene;
+use std::array::from_fn;
 use std::f64::consts::TAU;
 
 /// One a joint.
@@ -10,19 +12,22 @@ use std::f64::consts::TAU;
 pub(crate) struct Encoders {
     joint_count: usize,
     counts_per_rad: JointVector,
+    reversed: [bool; MAX_JOINTS],
+    zero_counts: [i32; MAX_JOINTS],
     noise_counts: f64,
     noise: fastrand::Rng,
 }
 
 impl Encoders {
     pub(crate) fn new(scene: &Scene) -> Self {
-        let mut counts_per_rad = [0.0; MAX_JOINTS];
-        for (counts, joint) in counts_per_rad.iter_mut().zip(&scene.joints) {
-            *counts = joint.encoder_counts_per_turn / TAU;
-        }
+        let joints = &scene.joints;
         Self {
-            joint_count: scene.joints.len(),
-            counts_per_rad,
+            joint_count: joints.len(),
+            counts_per_rad: from_fn(|k| {
+                joints.get(k).map_or(0.0, |joint| joint.encoder_counts_per_turn / TAU)
+            }),
+            reversed: from_fn(|k| joints.get(k).is_some_and(|joint| joint.encoder_reversed)),
+            zero_counts: from_fn(|k| joints.get(k).map_or(0, |joint| joint.encoder_zero_count)),
             noise_counts: scene.sensors.noise_counts,
             noise: fastrand::Rng::with_seed(u64::from(scene.seed)),
         }
@@ -33,7 +38,9 @@ impl Encoders {
         let mut counts = [0; MAX_JOINTS];
         for k in 0..self.joint_count {
             let noise = if self.noise_counts > 0.0 { self.noise_counts * self.normal() } else { 0.0 };
-            counts[k] = (angles_rad[k] * self.counts_per_rad[k] + noise).round() as i32;
+            let turned = (angles_rad[k] * self.counts_per_rad[k] + noise).round() as i32;
+            let counted = if self.reversed[k] { turned.wrapping_neg() } else { turned };
+            counts[k] = self.zero_counts[k].wrapping_add(counted);
         }
         counts
     }

@@ -92,6 +92,39 @@ fn safety_numbers_come_from_the_file() {
     }
 }
 
+/// What a person who wires a hand finds out, joint by joint, is what its firmware is built with.
+#[test]
+fn signs_zeros_and_scales_come_from_the_file() {
+    let defaults = "[joint_defaults]\nencoder_zero_count = -7\ntorque_per_volt_nm_v = 0.25";
+    let text = hand_text()
+        .replacen("[joint_defaults]", defaults, 1)
+        .replacen("name = \"finger-1-abduct\"", "name = \"finger-1-abduct\"\nencoder_reversed = true", 1)
+        .replacen(
+            "name = \"finger-1-flex-1\"\n",
+            "name = \"finger-1-flex-1\"\nmotor_reversed = true\nencoder_zero_count = 9\n",
+            1,
+        );
+    let model = HandModel::parse(&text, "h").unwrap();
+    let encoders = model.config.estimator.encoders;
+    let signs_and_zeros = [0, 1, 2].map(|k| (encoders[k].reversed, encoders[k].zero_count));
+    assert_eq!(signs_and_zeros, [(true, -7), (false, 9), (false, -7)]);
+    assert_eq!(model.torques_per_volt_nm_v[..3], [0.25, -0.25, 0.25]);
+    let source = model.source();
+    assert!(source.contains("TORQUES_PER_VOLT_NM_V: [f32; JOINTS] = [0.25, -0.25, 0.25, 0.25,"), "{source}");
+    assert!(source.contains("Encoder { zero_count: 9, rad_per_count: "), "{source}");
+    // Unless given: the paper's amplifier, motor and gear.
+    let usual = HandModel::load("three-finger").unwrap();
+    assert_eq!(usual.torques_per_volt_nm_v, [1.1 * 23.4e-3 * 5.4_f32; 12]);
+    assert_ne!(usual.hash(), model.hash());
+    assert_eq!(
+        message("encoder_counts_per_turn", "torque_per_volt_nm_v = -0.1\nencoder_counts_per_turn"),
+        format!(
+            "h.toml:{}: joint.1.torque_per_volt_nm_v: -0.1 is out of range; has to be between 1e-6 and 10000.0; its sign is `motor_reversed`",
+            line("encoder_counts_per_turn")
+        )
+    );
+}
+
 /// A scene's controller has the hand's safety numbers, and so has what is written of a run.
 #[test]
 fn safety_numbers_act_in_a_scene_and_are_written_out() {

@@ -318,6 +318,7 @@ fn scenes_built_in_code_refuse_numbers_that_are_none() {
         |s| &mut s.hand.joints[1].torque_limit_nm,
         |s| &mut s.hand.joints[1].speed_limit_rad_s,
         |s| &mut s.hand.joints[1].encoder_counts_per_turn,
+        |s| &mut s.hand.joints[1].torque_per_volt_nm_v,
         |s| &mut s.hand.joints[1].viscous_friction_nm_s_rad,
         |s| &mut s.hand.joints[1].coulomb_friction_nm,
         |s| &mut s.hand.joints[1].presliding_rad,

@@ -44,6 +44,7 @@ fn numbers(file: &mut HandFile) -> Vec<&mut f64> {
             &mut joint.torque_limit_nm,
             &mut joint.speed_limit_rad_s,
             &mut joint.encoder_counts_per_turn,
+            &mut joint.torque_per_volt_nm_v,
         ]);
         all.extend([
             &mut joint.viscous_friction_nm_s_rad,

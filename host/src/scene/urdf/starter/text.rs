@@ -168,7 +168,7 @@ impl<'a> Draft<'a> {
             guesses.push(format!("force: {}", self.force_rule(gains)));
         }
         guesses.push(format!(
-            "gains: force {:?} N, attitude stiffness {:?} N m, damping; encoders; stiffness of the fingertips",
+            "gains: force {:?} N, attitude stiffness {:?} N m, damping; encoders; torques per volt; stiffness of the fingertips",
             gains.force_n, gains.attitude_stiffness_nm
         ));
         guesses
@@ -228,6 +228,9 @@ impl<'a> Draft<'a> {
              end_stops = true\n\n\
              [joint_defaults]\n\
              encoder_counts_per_turn = 16384       # GUESS: 14 bits a turn of the joint; with a gear, motor counts times its ratio\n\
+             encoder_reversed = false              # true for a joint whose count falls while it turns in its positive direction\n\
+             encoder_zero_count = 0                # the count at joint angle zero\n\
+             motor_reversed = false                # true for a joint that a positive voltage pushes in its negative direction\n\
              presliding_rad = 2e-4                 # GUESS: how far a joint gives before it slides\n\n\
              [fingertip_defaults]\n\
              # Of the paper's fingertips (Table I).\n\
@@ -286,6 +289,8 @@ impl<'a> Draft<'a> {
             line("nominal_rad", format!("{:?}  # GUESS", needs.nominal_rad));
         }
         line("damping_gain_nm_s_rad", format!("{:?}  # GUESS", joint.damping_nm_s));
+        let limit_nm = self.joint(k).limit.effort.filter(|_| !needs.torque).unwrap_or(joint.torque_nm);
+        line("torque_per_volt_nm_v", format!("{:?}  # GUESS: its torque limit at 10 V", limit_nm / 10.0));
         if needs.torque {
             line("torque_limit_nm", format!("{:?}  # GUESS", joint.torque_nm));
         }
