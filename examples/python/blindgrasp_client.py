@@ -396,6 +396,9 @@ IDENTITY = Struct(
             kind=Enum("Panic", "HardFault"), program_counter=U32, link_register=U32, line=U32, file_hash=U32
         )
     ),
+    brown_out=Enum("Level3", "Level2", "Level1", "Off", "Unknown"),
+    clock_hz=U32,
+    most_baud=U32,
     changed=Unsigned(64),
 )
 REPLY = Enum(
@@ -524,7 +527,7 @@ class Replies:
             raise Unusable("Lost")
         last, half = self.last, Fixed("e")
         sequence, tick, state, parts, cycles, late = struct.unpack("<BHBBHB", body.take(8))
-        mode, events, size = state & 7, state >> 3 & 7, parts & 15
+        mode, events, size = state & 7, state >> 3, parts & 15
         if state >> 6 or mode >= len(MODES) or size > 8:
             raise Malformed("a dense record with unknown bits")
         sequence = not_below(last["sequence"], sequence, 8)

@@ -14,6 +14,7 @@ FAULTS = {
     10: "heartbeat of the host stopped",
     11: "tick was late too often",
     12: "joints put more energy into the world than they may",
+    13: "supply of the microcontroller is too low",
 }
 REFUSALS = {
     "NotArmed": "the hand is disarmed: arm it first",
@@ -45,6 +46,7 @@ EVENTS = {
     "heartbeat": 1,
     "late": 2,
     "fallback_clock": 4,
+    "supply_low": 8,
 }
 LIMITS = {
     "torque": 1,
@@ -87,6 +89,7 @@ PARAMETERS = [
     "faults.energy_j",
     "supervisor.soft_start_ms",
     "supervisor.release_ms",
+    "supervisor.amplifier_start_ms",
     "force_n",
     "attitude_stiffness_nm",
     "integral_gain_nm_rad",

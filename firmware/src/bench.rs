@@ -117,7 +117,7 @@ impl Joints<JOINTS> for Swinging<'_> {
         }))
     }
 
-    fn write(&mut self, _torques_nm: &[f32; JOINTS]) -> Option<Raised> {
+    fn write(&mut self, _torques_nm: &[f32; JOINTS], _powered: bool) -> Option<Raised> {
         None
     }
 }

@@ -180,6 +180,12 @@ pub fn pins(a: GPIOA, b: GPIOB, c: GPIOC, rcc: &mut Rcc) -> (LinePins, JointPins
     (line, joints)
 }
 
+/// Takes the amplifiers' power away, whoever has the pin.
+pub fn amplifiers_off() {
+    // SAFETY: the register is always there, and writing it changes only the pin whose bit is set: to its safe side.
+    unsafe { (*GPIOB::ptr()).bsrr().write(|w| w.bits(1 << 16)) };
+}
+
 /// Memory of the two buses, for as long as the program runs.
 pub struct Buses {
     counters: MaybeUninit<SharedBus<Spi<SPI1>>>,

@@ -1,9 +1,9 @@
 //! The start that both images share: clock, and why there was a reset.
 
-use crate::{clock, crash, model, reset};
+use crate::{board, clock, crash, model, reset};
 use blindgrasp_shared::device::Device;
-use blindgrasp_shared::identity::{Clock, Crash, Identity, Image, ResetCause, UNITS};
-use stm32f4xx_hal::pac::{DBGMCU, RCC};
+use blindgrasp_shared::identity::{BrownOut, Clock, Crash, Identity, Image, ResetCause};
+use stm32f4xx_hal::pac::{DBGMCU, FLASH, RCC};
 use stm32f4xx_hal::rcc::Rcc;
 
 use crate::model::{FINGERS, JOINTS};
@@ -18,18 +18,24 @@ pub struct Boot {
     pub reset: ResetCause,
     /// What ended the run before it.
     pub crash: Option<Crash>,
+    /// Level of the brown-out reset.
+    pub brown_out: BrownOut,
 }
 
 impl Boot {
     /// Finds out why there was a reset, and starts the clock.
-    pub fn new(rcc: RCC, debug: &DBGMCU) -> Self {
+    pub fn new(rcc: RCC, debug: &DBGMCU, flash: &FLASH) -> Self {
         let reset = reset::cause(rcc.csr().read().bits());
         // The flags add up over resets until they are cleared.
         rcc.csr().modify(|_, w| w.rmvf().clear());
         // Logs stay readable while the processor sleeps, and the watchdog waits while it is halted.
         debug.cr().modify(|_, w| w.dbg_sleep().set_bit());
         let (rcc, clock) = clock::start(rcc, clock::is_emulated(debug));
-        Self { rcc, clock, reset, crash: crash::take() }
+        let brown_out = match clock {
+            Clock::Emulated => BrownOut::Unknown,
+            Clock::External | Clock::Fallback => reset::brown_out(flash.optcr().read().bits()),
+        };
+        Self { rcc, clock, reset, crash: crash::take(), brown_out }
     }
 
     /// Whether this is QEMU.
@@ -43,7 +49,16 @@ impl Boot {
     /// Never: the build wrote the description.
     pub fn device(&self, image: &'static [u8]) -> Device<JOINTS, FINGERS> {
         let image = Image::decode(image).expect("the build wrote the description");
-        let &Self { clock, reset, crash, .. } = self;
-        Device::new(model::params(), Identity { image, units: UNITS, clock, reset, crash })
+        let &Self { clock, reset, crash, brown_out, .. } = self;
+        let clock_hz = if self.is_emulated() { 0 } else { board::SYSTEM_CLOCK.raw() };
+        let told = Identity {
+            reset,
+            crash,
+            brown_out,
+            clock_hz,
+            most_baud: board::BAUD,
+            ..Identity::of(image, clock)
+        };
+        Device::new(model::params(), told)
     }
 }

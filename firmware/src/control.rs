@@ -9,12 +9,15 @@ use crate::queue::HandPacket;
 use crate::{
     queue::{ControlEnd, Telemetry},
     schedule::Turn,
+    supply,
 };
-use blindgrasp_shared::command::Command;
+use blindgrasp_shared::command::{Answer, Command};
 use blindgrasp_shared::device::{Device, Inputs, Outputs, Reading};
 use blindgrasp_shared::fault::Raised;
-use blindgrasp_shared::link::message::Request;
 use blindgrasp_shared::telemetry::burst::Burst;
+
+/// A fault that was cleared.
+const CLEARED: Answer = Answer { command: Command::ClearFault, refused: None };
 
 /// The records around a fault.
 pub type HandBurst = Burst<JOINTS>;
@@ -24,6 +27,8 @@ pub type HandBurst = Burst<JOINTS>;
 pub struct Timing {
     /// It missed its deadline.
     pub late: bool,
+    /// The supply was too low at some time since it began.
+    pub supply_low: bool,
     /// Processor cycles that it took; zero where they can't be counted.
     pub cycles: u32,
 }
@@ -38,6 +43,7 @@ pub fn task(
 ) -> Timing {
     let turn = Turn::begin();
     let packet = queues.take();
+    let last = Timing { supply_low: supply::take(), ..last };
     let outputs = control.turn(joints, packet, last, queues.dropped());
     if let Some(reply) = outputs.reply {
         queues.answer(reply);
@@ -71,7 +77,8 @@ impl Control {
         &self.device
     }
 
-    /// One turn. Torques that could not be written are a failed reading in the next.
+    /// One turn. Torques that could not be written are a failed reading in the next. Joints that failed work again when
+    /// the tick has taken the user's command to clear the fault, and not before.
     pub fn turn(
         &mut self,
         joints: &mut impl Joints<JOINTS>,
@@ -79,17 +86,15 @@ impl Control {
         last: Timing,
         dropped: u32,
     ) -> Outputs<JOINTS> {
-        // Joints that failed work again only when the user clears the fault. Whether he may, the tick decides: they
-        // have no torque before that.
-        let clears = |packet: &HandPacket| packet.request == Request::Command(Command::ClearFault);
-        if packet.as_ref().is_some_and(clears) {
-            joints.recover();
-        }
         let read = joints.read();
         let reading = self.failed.take().map_or(read, Reading::Failed);
-        let inputs = Inputs { reading, late: last.late, cycles: last.cycles, dropped, packet };
+        let Timing { late, supply_low, cycles } = last;
+        let inputs = Inputs { reading, late, supply_low, cycles, dropped, packet };
         let outputs = self.device.tick(&inputs, self.burst);
-        self.failed = joints.write(&outputs.torques_nm);
+        if outputs.record.answer == Some(CLEARED) {
+            joints.recover();
+        }
+        self.failed = joints.write(&outputs.torques_nm, outputs.powered);
         outputs
     }
 }

@@ -47,6 +47,8 @@ pub mod schedule;
 pub mod semihosting;
 #[cfg(target_os = "none")]
 pub mod serial;
+#[cfg(target_os = "none")]
+pub mod supply;
 
 #[cfg(all(target_os = "none", not(feature = "no-panic")))]
 use defmt_rtt as _;

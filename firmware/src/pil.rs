@@ -38,14 +38,15 @@ impl Joints<JOINTS> for Remote<'_> {
     fn read(&mut self) -> Reading<JOINTS> {
         let Sample { counts, failed, .. } = self.0;
         match (failed, counts.as_slice().try_into()) {
-            (Some(raised), _) => Reading::Failed(*raised),
+            (Some(raised), Ok(counts)) => Reading::Tested { raised: *raised, counts },
+            (Some(raised), Err(_)) => Reading::Failed(*raised),
             (None, Ok(counts)) => Reading::Counts(counts),
             (None, Err(_)) => Reading::Failed(Raised::at(counts.iter().count(), Fault::SampleMissing)),
         }
     }
 
     /// The torques are in the record.
-    fn write(&mut self, _torques_nm: &[f32; JOINTS]) -> Option<Raised> {
+    fn write(&mut self, _torques_nm: &[f32; JOINTS], _powered: bool) -> Option<Raised> {
         None
     }
 }
@@ -89,7 +90,7 @@ impl<'c, W: Way> Lockstep<'c, W> {
 
     fn tick(&mut self, sample: &Sample<JOINTS>) -> Option<()> {
         let packet = self.waiting.pop_front();
-        let last = Timing { late: sample.late, cycles: self.cycles };
+        let last = Timing { late: sample.late, supply_low: false, cycles: self.cycles };
         let began = (self.cycle_count)();
         let outputs = self.control.turn(&mut Remote(sample), packet, last, 0);
         self.cycles = (self.cycle_count)().wrapping_sub(began);

@@ -162,7 +162,7 @@ pub fn dequeue<T>(queue: &mut Consumer<'_, T>) -> Option<T> {
 mod tests {
     use super::*;
     use blindgrasp_shared::device::{Device, Inputs, Reading};
-    use blindgrasp_shared::identity::{Clock, Identity, Image, ResetCause, UNITS};
+    use blindgrasp_shared::identity::{Clock, Identity, Image};
     use blindgrasp_shared::telemetry::burst::Burst;
     use std::boxed::Box;
 
@@ -188,17 +188,12 @@ mod tests {
 
     fn record() -> Telemetry {
         let hand = crate::model::params();
-        let identity = Identity {
-            image: Image::decode(&crate::model::IMAGE_HAND).unwrap(),
-            units: UNITS,
-            clock: Clock::Emulated,
-            reset: ResetCause::Unknown,
-            crash: None,
-            changed: 0,
-        };
+        let image = Image::decode(&crate::model::IMAGE_HAND).unwrap();
+        let identity = Identity::of(image, Clock::Emulated);
         let inputs = Inputs {
             reading: Reading::Counts([0; JOINTS]),
             late: false,
+            supply_low: false,
             cycles: 0,
             dropped: 0,
             packet: None,

@@ -22,7 +22,8 @@ pub fn start(boot: &Boot, image: &[u8]) {
             image.interface_version
         );
     }
-    defmt::info!("clock: {=str}; reset: {=str}", boot.clock.words(), boot.reset.words());
+    let (clock, reset, brown_out) = (boot.clock.words(), boot.reset.words(), boot.brown_out.words());
+    defmt::info!("clock: {=str}; reset: {=str}; brown-out reset: {=str}", clock, reset, brown_out);
     if let Some(crash) = &boot.crash {
         match crash.kind {
             CrashKind::Panic => {

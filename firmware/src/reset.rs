@@ -1,6 +1,6 @@
-//! Why the microcontroller was reset.
+//! Why the microcontroller was reset, and when its supply resets it.
 
-use blindgrasp_shared::identity::ResetCause;
+use blindgrasp_shared::identity::{BrownOut, ResetCause};
 
 /// The flags of `RCC_CSR` (RM0090 7.3.21), and what each tells.
 const CAUSES: [(u32, ResetCause); 7] = [
@@ -20,6 +20,16 @@ pub fn cause(csr: u32) -> ResetCause {
     found.map_or(ResetCause::Unknown, |&(_, cause)| cause)
 }
 
+/// Level of the brown-out reset, from the register `FLASH_OPTCR` (RM0090 3.9.10): `BOR_LEV` in bits 3 and 2.
+pub fn brown_out(optcr: u32) -> BrownOut {
+    match optcr >> 2 & 0b11 {
+        0b00 => BrownOut::Level3,
+        0b01 => BrownOut::Level2,
+        0b10 => BrownOut::Level1,
+        _ => BrownOut::Off,
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -36,5 +46,15 @@ mod tests {
         assert_eq!(cause(PIN | 1 << 31), ResetCause::LowPower);
         // LSION and LSIRDY, and RMVF, are no causes.
         assert_eq!(cause(0b11 | 1 << 24), ResetCause::Unknown);
+    }
+
+    #[test]
+    fn the_brown_out_level_is_two_bits_of_the_options() {
+        // As it comes from the factory: no read or write protection, no brown-out reset.
+        assert_eq!(brown_out(0x0FFF_AAED), BrownOut::Off);
+        for (bits, level) in [(0, BrownOut::Level3), (1, BrownOut::Level2), (2, BrownOut::Level1)] {
+            assert_eq!(brown_out(0x0FFF_AAED & !0b1100 | bits << 2), level);
+            assert_eq!(brown_out(bits << 2), level);
+        }
     }
 }

@@ -70,6 +70,10 @@ fn failed<const J: usize>(joint: usize, fault: Fault) -> Reading<J> {
     Reading::Failed(Raised::at(joint, fault))
 }
 
+fn tested<const J: usize>(joint: usize, fault: Fault, counts: [i32; J]) -> Reading<J> {
+    Reading::Tested { raised: Raised::at(joint, fault), counts }
+}
+
 /// Ticks until the reading is counts again, with the user's command in each.
 fn recover<const J: usize, const D: usize>(joints: &mut Hand<J, D>) -> [i32; J] {
     for _ in 0..100 {
@@ -77,7 +81,7 @@ fn recover<const J: usize, const D: usize>(joints: &mut Hand<J, D>) -> [i32; J] 
         if let Reading::Counts(counts) = joints.read() {
             return counts;
         }
-        assert_eq!(joints.write(&[1.0; J]), None);
+        assert_eq!(joints.write(&[1.0; J], true), None);
     }
     panic!("not recovered: {:?}", joints.failure());
 }
@@ -96,7 +100,7 @@ fn a_hand_boots_counts_and_gives_torque() {
     assert_eq!(joints.read(), Reading::Counts(array::from_fn(|joint| 100 * joint as i32 - 500)));
 
     let torques_nm = array::from_fn(|joint| 0.1 * joint as f32 - 0.5);
-    assert_eq!(joints.write(&torques_nm), None);
+    assert_eq!(joints.write(&torques_nm, true), None);
     for (torque_nm, volts) in torques_nm.into_iter().zip(board.volts()) {
         // Half a code, and the rounding of the product.
         assert!((torque_nm - volts * NM_PER_VOLT).abs() < 2.4e-5, "{torque_nm} N m is {volts} V");
@@ -107,7 +111,7 @@ fn a_hand_boots_counts_and_gives_torque() {
 fn outputs_are_off_before_anything_else() {
     let board = Board::<4, 1>::powered_up();
     let mut joints = board.boot();
-    assert_eq!(joints.write(&[1.0; 4]), None);
+    assert_eq!(joints.write(&[1.0; 4], true), None);
     assert!(!board.off());
     // The microcontroller resets in the middle of a grasp, and then finds that a counter is gone.
     board.counter(0).line = Line::Cut(0xFF);
@@ -119,7 +123,7 @@ fn outputs_are_off_before_anything_else() {
 
     // Even with numbers that can't be.
     let mut board = Board::<4, 1>::powered_up();
-    assert_eq!(board.boot().write(&[1.0; 4]), None);
+    assert_eq!(board.boot().write(&[1.0; 4], true), None);
     board.config.outputs[2].nm_per_volt = 0.0;
     let error = board.try_boot().map(|_| ()).unwrap_err();
     assert_eq!(error, ConfigError::Scale { joint: 2 });
@@ -189,7 +193,7 @@ fn a_counter_that_does_not_answer_is_named() {
             let mut joints = board.boot();
             for _ in 0..30 {
                 assert_eq!(joints.read(), failed(joint, Fault::SampleMissing), "{line:?}");
-                assert_eq!(joints.write(&[1.0; 6]), None);
+                assert_eq!(joints.write(&[1.0; 6], true), None);
                 joints.recover();
                 assert!(board.off());
             }
@@ -197,12 +201,12 @@ fn a_counter_that_does_not_answer_is_named() {
             let board = Board::<6, 2>::powered_up();
             let mut joints = board.boot();
             assert_eq!(joints.read(), Reading::Counts([0; 6]));
-            assert_eq!(joints.write(&[1.0; 6]), None);
+            assert_eq!(joints.write(&[1.0; 6], true), None);
             board.counter(joint).line = line;
             assert_eq!(joints.read(), failed(joint, Fault::SampleMissing), "{line:?}");
             // Already before the tick.
             assert!(board.off());
-            assert_eq!(joints.write(&[1.0; 6]), None);
+            assert_eq!(joints.write(&[1.0; 6], true), None);
             assert_eq!(board.volts(), [0.0; 6]);
         }
     }
@@ -269,7 +273,7 @@ fn a_dac_that_does_not_answer_is_named() {
             let board = Board::<12, 3>::powered_up();
             let mut joints = board.boot();
             board.dac(k).line = line;
-            let found = (0..12).find_map(|_| joints.write(&[0.5; 12])).expect("found within a turn");
+            let found = (0..12).find_map(|_| joints.write(&[0.5; 12], true)).expect("found within a turn");
             assert_eq!(found, Raised::at(4 * k, Fault::OutputFailed), "{line:?}");
             // It may be that this DAC can't be told, but its amplifiers are.
             assert!(!board.enable.high.get());
@@ -292,7 +296,7 @@ fn an_output_that_is_shorted_hot_or_without_power_is_named() {
         let board = Board::<12, 3>::powered_up();
         let mut joints = board.boot();
         spoil(&mut board.dac(1));
-        let found = (0..12).find_map(|_| joints.write(&[0.5; 12])).expect("found within a turn");
+        let found = (0..12).find_map(|_| joints.write(&[0.5; 12], true)).expect("found within a turn");
         assert_eq!(found, Raised::at(joint, Fault::OutputFailed));
         assert!(board.off());
     }
@@ -302,36 +306,43 @@ fn an_output_that_is_shorted_hot_or_without_power_is_named() {
 fn switching_off_is_repeated() {
     let board = Board::<6, 2>::powered_up();
     let mut joints = board.boot();
-    assert_eq!(joints.write(&[1.0; 6]), None);
+    assert_eq!(joints.write(&[1.0; 6], true), None);
     board.counter(0).line = Line::Cut(0xFF);
     board.dac(1).line = Line::Error;
     assert_eq!(joints.read(), failed(0, Fault::SampleMissing));
     assert!(board.dac(1).power & 0b1111 != 0 && !board.enable.high.get());
     board.dac(1).line = Line::Whole;
-    assert_eq!(joints.write(&[1.0; 6]), None);
+    assert_eq!(joints.write(&[1.0; 6], true), None);
     assert!(board.off());
 }
 
 #[test]
-fn amplifiers_are_enabled_last_and_only_if_all_is_well() {
+fn amplifiers_have_power_only_where_it_is_wanted_and_all_is_well() {
     let board = Board::<6, 2>::powered_up();
     let mut joints = board.boot();
-    assert!(board.enable.high.get());
+    assert!(!board.enable.high.get());
+    for powered in [false, true, false, true] {
+        joints.read();
+        assert_eq!(joints.write(&[0.0; 6], powered), None);
+        assert_eq!(board.enable.high.get(), powered);
+    }
     board.counter(5).lose_power();
     joints.read();
     assert!(!board.enable.high.get());
     for _ in 0..30 {
         joints.read();
-        joints.write(&[1.0; 6]);
+        joints.write(&[1.0; 6], true);
         assert!(!board.enable.high.get());
     }
     joints.recover();
+    assert!(!board.enable.high.get());
+    assert_eq!(joints.write(&[1.0; 6], true), None);
     assert!(board.enable.high.get());
 
     board.enable.broken.set(true);
-    let joints = board.boot();
-    let failure = joints.failure().expect("a failure");
-    assert_eq!(failure.raised(), Raised::at(0, Fault::OutputFailed));
+    let mut joints = board.boot();
+    assert_eq!(joints.write(&[0.0; 6], false), None);
+    assert_eq!(joints.write(&[0.0; 6], true), Some(Raised::at(0, Fault::OutputFailed)));
     assert!(board.off());
 }
 
@@ -340,8 +351,8 @@ fn torque_that_is_no_number_is_none_and_a_fault() {
     for bad in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
         let board = Board::<4, 1>::powered_up();
         let mut joints = board.boot();
-        assert_eq!(joints.write(&[0.5; 4]), None);
-        assert_eq!(joints.write(&[0.5, 0.5, bad, bad]), Some(Raised::at(2, Fault::NotFinite)));
+        assert_eq!(joints.write(&[0.5; 4], true), None);
+        assert_eq!(joints.write(&[0.5, 0.5, bad, bad], true), Some(Raised::at(2, Fault::NotFinite)));
         let volts = board.volts();
         assert_eq!((volts[2], volts[3]), (0.0, 0.0));
         assert!(volts[0] > 3.0 && volts[1] > 3.0);
@@ -364,7 +375,7 @@ fn torque_saturates_at_full_scale() {
         (f32::MAX, [top_v, -10.0]),
         (f32::MIN, [-10.0, top_v]),
     ] {
-        assert_eq!(joints.write(&[torque_nm; 4]), None);
+        assert_eq!(joints.write(&[torque_nm; 4], true), None);
         assert_eq!(board.volts(), [volts, volts, volts, reversed], "{torque_nm} N m");
     }
 }
@@ -375,7 +386,7 @@ fn the_nearest_code_is_taken() {
     let mut joints = board.boot();
     let code_nm = NM_PER_VOLT * 10.0 / 32768.0;
     for (codes, code) in [(0.49, 0), (0.51, 1), (-0.49, 0), (-0.51, -1), (1000.4, 1000), (-1000.6, -1001)] {
-        assert_eq!(joints.write(&[codes * code_nm; 4]), None);
+        assert_eq!(joints.write(&[codes * code_nm; 4], true), None);
         assert_eq!(board.dac(0).codes.map(u16::cast_signed), [code; 4]);
     }
 }
@@ -401,10 +412,14 @@ fn recovery_needs_the_cable_and_the_command() {
     joints.recover();
     assert_eq!(joints.read(), failed(8, Fault::SampleMissing));
     board.counter(8).line = Line::Whole;
+    for _ in 0..27 {
+        assert_eq!(joints.read(), failed(8, Fault::SampleMissing));
+    }
     // All is well, but nobody has said so.
     for _ in 0..100 {
-        assert_eq!(joints.read(), failed(8, Fault::SampleMissing));
-        assert_eq!(joints.write(&[1.0; 12]), None);
+        let counts = array::from_fn(|joint| 7 + joint as i32);
+        assert_eq!(joints.read(), tested(8, Fault::SampleMissing, counts));
+        assert_eq!(joints.write(&[1.0; 12], true), None);
         assert!(board.off());
     }
     board.counter(0).turn(1000);
@@ -414,11 +429,11 @@ fn recovery_needs_the_cable_and_the_command() {
     assert_eq!(joints.read(), Reading::Counts(counts));
     assert_eq!(joints.zeros(), &[Zero::Kept; 12]);
     assert_eq!(board.volts(), [0.0; 12]);
-    assert_eq!(joints.write(&[1.0; 12]), None);
+    assert_eq!(joints.write(&[1.0; 12], true), None);
     assert!(board.volts().iter().all(|&volts| volts > 6.0));
 }
 
-/// A counter that lost its power counts from 0 from the command on; no count before that is ever given out.
+/// A counter that lost its power counts from 0 from the command on; until then, 0 is what it would begin with.
 #[test]
 fn after_lost_power_the_command_sets_the_zero() {
     let board = Board::<6, 2>::powered_up();
@@ -428,10 +443,11 @@ fn after_lost_power_the_command_sets_the_zero() {
     }
     board.counter(2).lose_power();
     assert_eq!(joints.read(), failed(2, Fault::CounterReset));
-    for _ in 0..30 {
+    for _ in 0..14 {
         assert_eq!(joints.read(), failed(2, Fault::CounterReset));
     }
     board.counter(2).turn(33);
+    assert_eq!(joints.read(), tested(2, Fault::CounterReset, [500, 500, 0, 500, 500, 500]));
     joints.recover();
     board.counter(2).turn(4);
     assert_eq!(joints.read(), Reading::Counts([500, 500, 4, 500, 500, 500]));
@@ -447,8 +463,13 @@ fn what_breaks_between_test_and_command_is_found() {
         joints.read();
     }
     board.counter(1).line = Line::Cut(0x00);
-    joints.recover();
-    assert_eq!(joints.read(), failed(1, Fault::SampleMissing));
+    // It is found by the next reading, whether the command comes before or not.
+    for commanded in [false, true] {
+        if commanded {
+            joints.recover();
+        }
+        assert_eq!(joints.read(), failed(1, Fault::SampleMissing));
+    }
     board.counter(1).line = Line::Whole;
     for _ in 0..30 {
         joints.read();
@@ -469,14 +490,14 @@ fn every_failure_can_be_recovered_from() {
         board.dac(0).line = line;
         for _ in 0..10 {
             joints.read();
-            joints.write(&[1.0; 6]);
+            joints.write(&[1.0; 6], true);
             joints.recover();
         }
         assert!(joints.failure().is_some());
         board.counter(5).line = Line::Whole;
         board.dac(0).line = Line::Whole;
         assert_eq!(recover(&mut joints), [0; 6]);
-        assert_eq!(joints.write(&[1.0; 6]), None);
+        assert_eq!(joints.write(&[1.0; 6], true), None);
         assert!(board.volts().iter().all(|&volts| volts > 6.0));
     }
 }
@@ -501,7 +522,7 @@ fn the_buses_are_busy_for_a_stated_time() {
 
     let running = measure(&mut || {
         joints.read();
-        joints.write(&[1.0; 12]);
+        joints.write(&[1.0; 12], true);
     });
     println!("tick {running:?}: {:.0} us", us(running));
     assert_eq!(running.0, Traffic { frames: 26, bits: 704 });
@@ -515,7 +536,7 @@ fn the_buses_are_busy_for_a_stated_time() {
     for _ in 0..60 {
         let tick = measure(&mut || {
             joints.read();
-            joints.write(&[1.0; 12]);
+            joints.write(&[1.0; 12], true);
         });
         longest = longest.max(us(tick));
     }

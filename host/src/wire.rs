@@ -2,7 +2,7 @@
 
 use crate::MAX_JOINTS;
 use blindgrasp_shared::command::Refusal;
-use blindgrasp_shared::identity::{Clock, Crash, Identity, ResetCause};
+use blindgrasp_shared::identity::{BrownOut, Clock, Crash, Identity, ResetCause};
 use blindgrasp_shared::link::message;
 use blindgrasp_shared::parameters::Setting;
 use blindgrasp_shared::telemetry::{self, INTERFACE_VERSION};
@@ -35,11 +35,15 @@ pub struct Firmware {
     pub reset: ResetCause,
     /// How it ended before, if that was not in order.
     pub crash: Option<Crash>,
+    /// Level of its brown-out reset.
+    pub brown_out: BrownOut,
+    /// Frequency of the clock that its cycles are counted in, Hz; 0 where nothing counts them.
+    pub clock_hz: u32,
 }
 
 impl From<&Identity<'_>> for Firmware {
     fn from(identity: &Identity<'_>) -> Self {
-        let &Identity { image, clock, reset, crash, .. } = identity;
+        let &Identity { image, clock, reset, crash, brown_out, clock_hz, .. } = identity;
         Self {
             words: image.to_string(),
             kind: image.kind.to_owned(),
@@ -49,6 +53,8 @@ impl From<&Identity<'_>> for Firmware {
             clock,
             reset,
             crash,
+            brown_out,
+            clock_hz,
         }
     }
 }

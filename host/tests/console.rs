@@ -8,7 +8,7 @@ use blindgrasp::{MAX_FINGERS, MAX_JOINTS};
 use blindgrasp_shared::command::{Command, Refusal};
 use blindgrasp_shared::device::{Device, Inputs, Reading};
 use blindgrasp_shared::fault::{Fault, Raised};
-use blindgrasp_shared::identity::{Clock, Crash, CrashKind, Identity, Image, ResetCause, UNITS};
+use blindgrasp_shared::identity::{Clock, Crash, CrashKind, Identity, Image, ResetCause};
 use blindgrasp_shared::link::message::Reply;
 use blindgrasp_shared::link::{Receiver, encode, most_bytes};
 use blindgrasp_shared::parameters::Parameter;
@@ -58,8 +58,7 @@ impl Board {
             file_hash: 0,
         };
         let clock = Clock::External;
-        let identity =
-            Identity { image, units: UNITS, clock, reset: ResetCause::Pin, crash: Some(crash), changed: 0 };
+        let identity = Identity { reset: ResetCause::Pin, crash: Some(crash), ..Identity::of(image, clock) };
         // A finger: abduction, and three knuckles that bend.
         let mut counts = [0; MAX_JOINTS];
         for (k, count) in counts.iter_mut().enumerate().take(hand.hand.joint_count()) {
@@ -92,9 +91,10 @@ impl Board {
     fn tick(&mut self) -> Vec<u8> {
         let packet = self.waiting.pop_front();
         let reading = self.reading;
-        let outputs = self
-            .device
-            .tick(&Inputs { reading, late: false, cycles: 7, dropped: 0, packet }, &mut self.burst);
+        let outputs = self.device.tick(
+            &Inputs { reading, late: false, supply_low: false, cycles: 7, dropped: 0, packet },
+            &mut self.burst,
+        );
         (self.mode, self.fault) = (outputs.record.mode, outputs.record.fault);
         let mut said = Vec::new();
         if let Some(reply) = outputs.reply {

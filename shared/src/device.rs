@@ -13,7 +13,7 @@ use crate::supervisor::Mode;
 use crate::telemetry::burst::{Burst, Caught};
 use crate::telemetry::snapshot::{Outgoing, Part};
 use crate::telemetry::{INTERFACE_VERSION, Record};
-use crate::tick::{Input, Params, Sensed, State, tick};
+use crate::tick::{self, Input, Params, Sensed, State};
 
 /// What a tick gets from the joints.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -22,6 +22,13 @@ pub enum Reading<const J: usize> {
     Counts([i32; J]),
     /// Joints that could not be read or driven.
     Failed(Raised),
+    /// Joints that failed and have passed their self-test since. A fault that is cleared brings them back.
+    Tested {
+        /// Why they failed.
+        raised: Raised,
+        /// Encoder counts that they would begin with now.
+        counts: [i32; J],
+    },
 }
 
 /// What a tick gets.
@@ -31,6 +38,8 @@ pub struct Inputs<const J: usize> {
     pub reading: Reading<J>,
     /// Whether the tick before missed its deadline.
     pub late: bool,
+    /// Whether the supply was too low at some time since the tick before.
+    pub supply_low: bool,
     /// How long it took, processor cycles; 0 where nothing counts them.
     pub cycles: u32,
     /// Records and replies that were lost since the start because a queue was full.
@@ -44,6 +53,8 @@ pub struct Inputs<const J: usize> {
 pub struct Outputs<const J: usize> {
     /// Torques of the next tick, N m.
     pub torques_nm: [f32; J],
+    /// Whether the amplifiers have power in it.
+    pub powered: bool,
     /// What the tick did.
     pub record: Record<J>,
     /// Whether the record is to be sent, and what of it.
@@ -103,14 +114,16 @@ impl<const J: usize, const F: usize> Device<J, F> {
             sensed: match &inputs.reading {
                 Reading::Counts(counts) => Sensed::Counts(counts),
                 Reading::Failed(raised) => Sensed::Failed(*raised),
+                Reading::Tested { raised, counts } => Sensed::Tested { raised: *raised, counts },
             },
             events: Events::NONE
                 .with(Event::Heartbeat, heartbeat)
                 .with(Event::Late, inputs.late)
+                .with(Event::SupplyLow, inputs.supply_low)
                 .with(Event::FallbackClock, self.identity.clock == Clock::Fallback),
             command,
         };
-        let mut output = tick(&self.params, &mut self.state, &input);
+        let mut output = tick::tick(&self.params, &mut self.state, &input);
         output.record.cycles = inputs.cycles;
         output.record.dropped = inputs.dropped;
         burst.take(&output.record);
@@ -133,7 +146,8 @@ impl<const J: usize, const F: usize> Device<J, F> {
                 Some(Reply::Answer { sequence, refused })
             }
         };
-        Outputs { torques_nm: output.torques_nm, record: output.record, telemetry, reply, part }
+        let tick::Output { torques_nm, powered, record } = output;
+        Outputs { torques_nm, powered, record, telemetry, reply, part }
     }
 
     /// Saves the state where it is due, and the part of it that is to be sent now.

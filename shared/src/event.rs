@@ -13,11 +13,13 @@ pub enum Event {
     Late = 1 << 1,
     /// The clock is not the crystal.
     FallbackClock = 1 << 2,
+    /// The supply was below what its monitor is set to, at some time since the tick before.
+    SupplyLow = 1 << 3,
 }
 
 impl Event {
     /// Every event.
-    pub const ALL: [Self; 3] = [Self::Heartbeat, Self::Late, Self::FallbackClock];
+    pub const ALL: [Self; 4] = [Self::Heartbeat, Self::Late, Self::FallbackClock, Self::SupplyLow];
 
     /// Its name in recordings and tables.
     pub const fn key(self) -> &'static str {
@@ -25,6 +27,7 @@ impl Event {
             Self::Heartbeat => "heartbeat",
             Self::Late => "late",
             Self::FallbackClock => "fallback_clock",
+            Self::SupplyLow => "supply_low",
         }
     }
 
@@ -34,6 +37,7 @@ impl Event {
             Self::Heartbeat => "heartbeat",
             Self::Late => "late",
             Self::FallbackClock => "fall-back clock",
+            Self::SupplyLow => "supply low",
         }
     }
 }

@@ -89,9 +89,32 @@ pub struct Identity<'a> {
     pub reset: ResetCause,
     /// How it ended before, if that was not in order.
     pub crash: Option<Crash>,
+    /// Where the microcontroller is held in reset when its supply sags.
+    pub brown_out: BrownOut,
+    /// Frequency of the processor's clock, in which a record's cycles are counted, Hz; 0 where nothing counts them.
+    pub clock_hz: u32,
+    /// The fastest that its line can be, bits a second; 0 where it has none.
+    pub most_baud: u32,
     /// The parameters that differ from the hand's file: a bit for each, by its
     /// [number](crate::parameters::Parameter::number).
     pub changed: u64,
+}
+
+impl<'a> Identity<'a> {
+    /// An image that runs, of which nothing else is known.
+    pub const fn of(image: Image<'a>, clock: Clock) -> Self {
+        Self {
+            image,
+            units: UNITS,
+            clock,
+            reset: ResetCause::Unknown,
+            crash: None,
+            brown_out: BrownOut::Unknown,
+            clock_hz: 0,
+            most_baud: 0,
+            changed: 0,
+        }
+    }
 }
 
 /// What gives a microcontroller its time.
@@ -149,6 +172,34 @@ impl ResetCause {
             Self::IndependentWatchdog => "independent watchdog: the control task stood still",
             Self::WindowWatchdog => "window watchdog",
             Self::LowPower => "low-power wake-up",
+            Self::Unknown => "unknown",
+        }
+    }
+}
+
+/// Level of a microcontroller's brown-out reset. It is kept beside the program: a firmware only tells it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub enum BrownOut {
+    /// The highest.
+    Level3,
+    /// The middle one.
+    Level2,
+    /// The lowest.
+    Level1,
+    /// None: the supply may sag until nothing works.
+    Off,
+    /// It does not say; an emulator does not.
+    Unknown,
+}
+
+impl BrownOut {
+    /// In words.
+    pub const fn words(self) -> &'static str {
+        match self {
+            Self::Level3 => "level 3",
+            Self::Level2 => "level 2",
+            Self::Level1 => "level 1",
+            Self::Off => "off",
             Self::Unknown => "unknown",
         }
     }

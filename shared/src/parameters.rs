@@ -117,6 +117,7 @@ parameters! {
     ENERGY,           Hand,  AtMost,  "faults.energy_j",               "J",         "Work in a second that the joints may do beyond the drop of the law's potentials", faults.energy_j;
     SOFT_START_TIME,  Hand,  AtLeast, "supervisor.soft_start_ms",      "ms",        "Time over which the force grows",                           supervisor.soft_start_ms;
     RELEASE_TIME,     Hand,  AtMost,  "supervisor.release_ms",         "ms",        "Time over which force and stiffness fall",                  supervisor.release_ms;
+    AMPLIFIER_START_TIME, Hand, AtLeast, "supervisor.amplifier_start_ms", "ms",       "Time that the amplifiers take to start after they got power", supervisor.amplifier_start_ms;
 }
 
 /// Every row: those above, the gains, their limits, the laws.

@@ -411,7 +411,7 @@ signals! {
     fault: Option<Raised>           = fault!("fault", "Fault that the hand is in");
     answer: Option<Answer>          = one!("answer", "", "Command of this tick, done or refused");
     events: Events                  = |_| Signal { key: "", unit: "", words: "" };
-    reading_failed: Option<Raised>  = fault!("reading_failed", "Fault for which there are no counts, where the joints could not be read");
+    reading_failed: Option<Raised>  = fault!("reading_failed", "Fault for which the joints could not be read or driven; with counts, they have passed their self-test since");
     gains: PerGain<f32>             = |k| GAINS[k].signal();
     potentials_j: PerGain<f32>      = |k| GAINS[k].potential;
     law_signals: PerSignal<f32>     = |k| SIGNALS[k];

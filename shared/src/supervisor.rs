@@ -7,7 +7,10 @@
 //! - **Releasing**: force and stiffness fall in proportion to zero over the release time; then armed.
 //! - **Fault**: no torque, until the fault is cleared.
 //!
-//! Where no torque is allowed there is none in the tick that enters the mode: no slew limit delays it.
+//! Where no torque is allowed there is none in the tick that enters the mode: no slew limit delays it. There the
+//! amplifiers have no power either: without torque they are switched off, not merely told zero. From `Arm` on they have
+//! it, and while they start ([`SupervisorConfig::amplifier_start_ms`]) the modes change as ever, but torque is zero and
+//! time does not count: a `Grasp` that comes meanwhile is done, and its soft start begins when they have started.
 //!
 //! | in \ event    | Arm       | Disarm     | Grasp      | Release      | Stop     | ClearFault | *fault* | *released* |
 //! |---------------|-----------|------------|------------|--------------|----------|------------|---------|------------|
@@ -52,6 +55,14 @@ pub enum Mode {
 impl Mode {
     /// Every mode.
     pub const ALL: [Self; 5] = [Self::Disarmed, Self::Armed, Self::Grasping, Self::Releasing, Self::Fault];
+
+    /// Whether the amplifiers have power in it.
+    pub const fn is_powered(self) -> bool {
+        match self {
+            Self::Disarmed | Self::Fault => false,
+            Self::Armed | Self::Grasping | Self::Releasing => true,
+        }
+    }
 
     /// Its name in words.
     pub const fn words(self) -> &'static str {
@@ -126,6 +137,8 @@ pub struct SupervisorConfig {
     pub soft_start_ms: u32,
     /// Time over which force and stiffness fall to zero, ms.
     pub release_ms: u32,
+    /// Time that the amplifiers take to start, without torque, ms.
+    pub amplifier_start_ms: u32,
 }
 
 impl SupervisorConfig {
@@ -137,15 +150,17 @@ impl SupervisorConfig {
         Ok(Ramps {
             soft_start: Ramp::new(period.ticks(self.soft_start_ms, "supervisor.soft_start_ms")?),
             release: Ramp::new(period.ticks(self.release_ms, "supervisor.release_ms")?),
+            amplifier_start_ticks: period.ticks(self.amplifier_start_ms, "supervisor.amplifier_start_ms")?,
         })
     }
 }
 
-/// The ramps of force and stiffness, prepared.
+/// The ramps of force and stiffness, prepared, and what comes before them.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Ramps {
     soft_start: Ramp,
     release: Ramp,
+    amplifier_start_ticks: u32,
 }
 
 /// A share that grows by the tick from nothing to one.
@@ -192,8 +207,10 @@ pub enum Drive {
 pub struct Supervisor {
     mode: Mode,
     fault: Option<Raised>,
-    /// Ticks in this mode before this one.
+    /// Ticks in this mode before this one, but for those in which the amplifiers started.
     age: u32,
+    /// Ticks until the amplifiers have started.
+    starting: u32,
     /// How far the soft start had come when the release began, in ticks of grasping.
     grasped: u32,
 }
@@ -201,7 +218,7 @@ pub struct Supervisor {
 impl Supervisor {
     /// Disarmed, without a fault.
     pub const fn new() -> Self {
-        Self { mode: Mode::Disarmed, fault: None, age: 0, grasped: 0 }
+        Self { mode: Mode::Disarmed, fault: None, age: 0, starting: 0, grasped: 0 }
     }
 
     pub(crate) fn save(&self, to: &mut Saver<'_>) -> Result<(), BufferTooSmall> {
@@ -212,6 +229,7 @@ impl Supervisor {
         to.u8(u8::from(joint.is_some()))?;
         to.u8(joint.unwrap_or(0))?;
         to.u32(self.age)?;
+        to.u32(self.starting)?;
         to.u32(self.grasped)
     }
 
@@ -227,7 +245,7 @@ impl Supervisor {
                 Some(Raised { fault, joint: has_joint.then_some(joint) })
             }
         };
-        Ok(Self { mode, fault, age: from.u32()?, grasped: from.u32()? })
+        Ok(Self { mode, fault, age: from.u32()?, starting: from.u32()?, grasped: from.u32()? })
     }
 
     /// The mode.
@@ -249,12 +267,20 @@ impl Supervisor {
         command: Option<Command>,
         objection: Option<Refusal>,
     ) -> Option<Answer> {
-        self.age = self.age.saturating_add(1);
+        if self.starting > 0 {
+            self.starting -= 1;
+        } else {
+            self.age = self.age.saturating_add(1);
+        }
         if let Some(raised) = fault {
             self.raise(raised);
         }
+        let was_powered = self.mode.is_powered();
         let answer = command.map(|command| Answer { command, refused: self.obey(command, fault, objection) });
-        if self.mode == Mode::Releasing && self.age >= ramps.release.ticks {
+        if !was_powered && self.mode.is_powered() {
+            self.starting = ramps.amplifier_start_ticks;
+        }
+        if self.mode == Mode::Releasing && self.starting == 0 && self.age >= ramps.release.ticks {
             self.take(Event::Released);
         }
         answer
@@ -278,6 +304,7 @@ impl Supervisor {
     pub fn drive(&self, ramps: &Ramps) -> Drive {
         match self.mode {
             Mode::Disarmed | Mode::Fault => Drive::Off,
+            _ if self.starting > 0 => Drive::Off,
             Mode::Armed => Drive::Hold,
             Mode::Grasping => {
                 Drive::Grip { force_share: ramps.soft_start.share(self.age), stiffness_share: 1.0 }
@@ -333,6 +360,9 @@ impl Supervisor {
                 }
                 self.mode = mode;
                 self.age = 0;
+                if !mode.is_powered() {
+                    self.starting = 0;
+                }
             }
         }
         None
@@ -356,8 +386,13 @@ mod tests {
     const RAISED: Raised = Raised { fault: Fault::Overspeed, joint: Some(2) };
     const GRASP: Command = Command::Grasp(Grasp::CONFIGURED);
 
+    fn starting_ramps(soft_start_ms: u32, release_ms: u32, amplifier_start_ms: u32) -> Ramps {
+        let config = SupervisorConfig { soft_start_ms, release_ms, amplifier_start_ms };
+        config.prepare(Period::from_us(1000).unwrap()).unwrap()
+    }
+
     fn ramps(soft_start_ms: u32, release_ms: u32) -> Ramps {
-        SupervisorConfig { soft_start_ms, release_ms }.prepare(Period::from_us(1000).unwrap()).unwrap()
+        starting_ramps(soft_start_ms, release_ms, 0)
     }
 
     /// A supervisor that was led into a mode.
@@ -602,9 +637,79 @@ mod tests {
     #[test]
     fn times_out_of_range_are_named() {
         let period = Period::from_us(1000).unwrap();
-        let config = SupervisorConfig { soft_start_ms: 4_000_000, release_ms: 0 };
-        assert_eq!(config.prepare(period).unwrap_err().parameter, "supervisor.soft_start_ms");
-        let config = SupervisorConfig { soft_start_ms: 0, release_ms: 4_000_000 };
-        assert_eq!(config.prepare(period).unwrap_err().parameter, "supervisor.release_ms");
+        let good = SupervisorConfig { soft_start_ms: 0, release_ms: 0, amplifier_start_ms: 0 };
+        let parameter = |config: SupervisorConfig| config.prepare(period).unwrap_err().parameter;
+        let config = SupervisorConfig { soft_start_ms: 4_000_000, ..good };
+        assert_eq!(parameter(config), "supervisor.soft_start_ms");
+        let config = SupervisorConfig { release_ms: 4_000_000, ..good };
+        assert_eq!(parameter(config), "supervisor.release_ms");
+        let config = SupervisorConfig { amplifier_start_ms: 4_000_000, ..good };
+        assert_eq!(parameter(config), "supervisor.amplifier_start_ms");
+    }
+
+    #[test]
+    fn while_the_amplifiers_start_there_is_power_but_no_torque() {
+        let ramps = starting_ramps(4, 5, 3);
+        let mut supervisor = Supervisor::new();
+        let mut tick = |command| {
+            let answer = supervisor.begin(&ramps, None, command, None);
+            assert_eq!(answer.and_then(|answer| answer.refused), None);
+            (supervisor.mode(), supervisor.drive(&ramps))
+        };
+        assert_eq!(tick(None), (Mode::Disarmed, Drive::Off));
+        assert_eq!(tick(Some(Command::Arm)), (Mode::Armed, Drive::Off));
+        assert_eq!(tick(None), (Mode::Armed, Drive::Off));
+        assert_eq!(
+            tick(Some(Command::Arm)),
+            (Mode::Armed, Drive::Off),
+            "armed already: it does not start anew"
+        );
+        assert_eq!(tick(None), (Mode::Armed, Drive::Hold));
+        // Armed again after a stop, they start again; so they do after a fault.
+        assert_eq!(tick(Some(Command::Stop)), (Mode::Disarmed, Drive::Off));
+        for _ in 0..2 {
+            assert_eq!(tick(Some(Command::Arm)), (Mode::Armed, Drive::Off));
+            assert_eq!(tick(Some(Command::Stop)), (Mode::Disarmed, Drive::Off));
+        }
+    }
+
+    #[test]
+    fn a_grasp_while_the_amplifiers_start_is_the_same_grasp_later() {
+        let late = |start_ms, release| {
+            let ramps = starting_ramps(4, 5, start_ms);
+            let mut supervisor = in_mode(Mode::Grasping, &ramps);
+            let mut drives = Vec::new();
+            for tick in 0..40 {
+                let command = (release == Some(tick)).then_some(Command::Release);
+                if tick > 0 {
+                    supervisor.begin(&ramps, None, command, None);
+                }
+                drives.push((supervisor.mode(), supervisor.drive(&ramps)));
+            }
+            drives
+        };
+        let torque = |drives: &[(Mode, Drive)]| {
+            let drives = drives.iter().map(|&(_, drive)| drive).skip_while(|&drive| drive == Drive::Off);
+            drives.take(20).collect::<Vec<_>>()
+        };
+        let (now, then) = (late(0, None), late(10, None));
+        assert_eq!(torque(&now), torque(&then));
+        assert_eq!(now[0].1, Drive::Grip { force_share: 0.25, stiffness_share: 1.0 });
+        // Armed a tick before the grasp: nine are left of ten.
+        assert!(then[..9].iter().all(|&tick| tick == (Mode::Grasping, Drive::Off)) && then[9].1 == now[0].1);
+        // A release that comes before any torque takes its time too, and ends armed.
+        let released = late(10, Some(3));
+        assert_eq!(released[3], (Mode::Releasing, Drive::Off));
+        assert!(released[9..14].iter().all(|tick| tick.0 == Mode::Releasing));
+        assert_eq!(released[14], (Mode::Armed, Drive::Hold));
+    }
+
+    #[test]
+    fn power_is_where_torque_may_be() {
+        for mode in Mode::ALL {
+            let ramps = ramps(4, 4);
+            let off = in_mode(mode, &ramps).drive(&ramps) == Drive::Off;
+            assert_eq!(mode.is_powered(), !off, "{mode:?}");
+        }
     }
 }

@@ -168,6 +168,14 @@ pub enum Sensed<'a, const J: usize> {
     },
     /// Nothing, because the joints could not be read or driven. The estimator starts anew with the next counts.
     Failed(Raised),
+    /// What joints that failed would begin with now: they have passed their self-test since, and wait for the fault to be
+    /// cleared.
+    Tested {
+        /// Why they failed.
+        raised: Raised,
+        /// Encoder counts.
+        counts: &'a [i32; J],
+    },
 }
 
 impl<'a, const J: usize> Input<'a, J> {
@@ -198,6 +206,8 @@ impl<'a, const J: usize> Input<'a, J> {
 pub struct Output<const J: usize> {
     /// Torques of the next tick, N m; zero beyond the hand's joints.
     pub torques_nm: [f32; J],
+    /// Whether the amplifiers have power in it.
+    pub powered: bool,
     /// What there is to tell.
     pub record: Record<J>,
 }
@@ -245,6 +255,7 @@ pub fn tick<const J: usize, const F: usize>(
         Sensed::Counts(counts) => (List::first_of(*counts, joint_count), None),
         Sensed::Ideal { .. } => (List::first_of([0; J], 0), None),
         Sensed::Failed(raised) => (List::first_of([0; J], 0), Some(raised)),
+        Sensed::Tested { raised, counts } => (List::first_of(*counts, joint_count), Some(raised)),
     };
     let account = action.account.unwrap_or(Account::none());
     let record = Record {
@@ -270,7 +281,7 @@ pub fn tick<const J: usize, const F: usize>(
         limiting: List::first_of(action.limiting, joint_count),
     };
     state.ticks = state.ticks.wrapping_add(1);
-    Output { torques_nm: action.torques_nm, record }
+    Output { torques_nm: action.torques_nm, powered: record.mode.is_powered(), record }
 }
 
 /// Updates the motion; the fault of the reading or of what it shows.
@@ -296,6 +307,13 @@ fn sense<const J: usize, const F: usize>(
             state.tracks.restart();
             return Some(raised);
         }
+        Sensed::Tested { raised, counts } => {
+            state.motion = params.prepared.estimator.update(&mut state.tracks, counts);
+            // Once the hand is in its fault, that they failed is no cause to stay there; what they would begin with may be.
+            if state.mode() != Mode::Fault {
+                return Some(raised);
+            }
+        }
     }
     params.prepared.watch.motion(&state.motion)
 }
@@ -320,11 +338,12 @@ fn watch<const J: usize, const F: usize>(
             };
             params.prepared.watch.standstill(watched, motion, torques_nm, driven)
         }
-        Sensed::Ideal { .. } | Sensed::Failed(_) => None,
+        Sensed::Ideal { .. } | Sensed::Failed(_) | Sensed::Tested { .. } => None,
     };
-    let powered = !matches!(supervisor.mode(), Mode::Disarmed | Mode::Fault);
-    let lost = (silent && powered).then_some(Raised::of_hand(Fault::LinkLost));
-    sensed.or(late).or(frozen).or(lost)
+    let lost = (silent && supervisor.mode().is_powered()).then_some(Raised::of_hand(Fault::LinkLost));
+    // A supply that sags may be why nothing else works.
+    let low = input.events.contains(Event::SupplyLow).then_some(Raised::of_hand(Fault::SupplyLow));
+    low.or(sensed).or(late).or(frozen).or(lost)
 }
 
 /// Why a command can't be done even in a mode that takes it.

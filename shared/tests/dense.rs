@@ -66,7 +66,7 @@ fn is<const J: usize>(heard: &Heard<'_, J>, sent: &Record12) {
     }
 }
 
-/// The bytes of interface version 4, as `docs/protocol.md` lays them down.
+/// The bytes of interface version 5, as `docs/protocol.md` lays them down.
 #[test]
 fn golden_bytes() {
     let mut sender = Sender::new();

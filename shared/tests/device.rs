@@ -7,7 +7,7 @@ use blindgrasp_shared::control::{GAIN_COUNT, PerGain};
 use blindgrasp_shared::device::{Device, Inputs, Outputs, Reading};
 use blindgrasp_shared::event::Event;
 use blindgrasp_shared::fault::{Fault, Raised};
-use blindgrasp_shared::identity::{Clock, Identity, Image, ResetCause, UNITS};
+use blindgrasp_shared::identity::{Clock, Identity, Image, ResetCause};
 use blindgrasp_shared::link::message::{Packet, Reply, Request, Sample, Signals, not_understood};
 use blindgrasp_shared::link::{self, Receiver, most_bytes};
 use blindgrasp_shared::parameters::{Bound, Parameter, Setting};
@@ -32,7 +32,7 @@ fn identity(clock: Clock) -> Identity<'static> {
         fingertip_count: 3,
         period_us: 1000,
     };
-    Identity { image, units: UNITS, clock, reset: ResetCause::PowerOn, crash: None, changed: 0 }
+    Identity { reset: ResetCause::PowerOn, ..Identity::of(image, clock) }
 }
 
 /// A device and a host that numbers its requests.
@@ -73,7 +73,10 @@ impl Bench {
     }
 
     fn tick_with(&mut self, reading: Reading<12>, dropped: u32, packet: Option<Packet12>) -> Outputs<12> {
-        self.device.tick(&Inputs { reading, late: false, cycles: 7, dropped, packet }, &mut self.burst)
+        self.device.tick(
+            &Inputs { reading, late: false, supply_low: false, cycles: 7, dropped, packet },
+            &mut self.burst,
+        )
     }
 
     fn packet(&mut self, request: Request<12>) -> Packet12 {
@@ -314,6 +317,24 @@ fn parameters_are_set_while_disarmed_and_a_limit_that_is_off_stays_off() {
 }
 
 #[test]
+fn the_amplifiers_are_given_at_least_the_time_of_the_hands_file() {
+    let mut config = config::<12>();
+    config.supervisor.amplifier_start_ms = 20;
+    let mut bench = Bench { device: Device::new(params(&config), identity(Clock::External)), ..Bench::new() };
+    bench.ask(Request::Hello { interface_version: INTERFACE_VERSION });
+    let parameter = Parameter::AMPLIFIER_START_TIME;
+    for (value, refused, left) in [
+        (30.0, None, 30.0),
+        (19.0, Some(Refusal::BeyondFile), 30.0),
+        (0.0, Some(Refusal::BeyondFile), 30.0),
+        (20.0, None, 20.0),
+    ] {
+        assert_eq!(bench.refused(Request::SetParameter { parameter, index: 0, value }), refused);
+        assert_eq!(bench.device.params().get(parameter, 0).map(|setting| setting.value), Ok(left));
+    }
+}
+
+#[test]
 fn records_come_as_asked_for() {
     let mut bench = Bench::new();
     assert!((0..10).all(|_| bench.tick(None).telemetry.is_none()));
@@ -355,7 +376,14 @@ fn joints_over_the_link_are_for_another_image_and_real_ones_may_fail() {
     let sample = Sample { counts: List::first_of([0; 12], 12), failed: None, late: false };
     assert_eq!(bench.refused(Request::Joints(sample)), Some(Refusal::JointsAreReal));
     let raised = Raised::at(4, Fault::CounterReset);
-    let inputs = Inputs { reading: Reading::Failed(raised), late: true, cycles: 0, dropped: 0, packet: None };
+    let inputs = Inputs {
+        reading: Reading::Failed(raised),
+        late: true,
+        supply_low: false,
+        cycles: 0,
+        dropped: 0,
+        packet: None,
+    };
     let record = bench.device.tick(&inputs, &mut bench.burst).record;
     assert_eq!((record.mode, record.fault, record.reading_failed), (Mode::Fault, Some(raised), Some(raised)));
     assert!(record.events.contains(Event::Late));

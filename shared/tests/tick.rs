@@ -9,7 +9,7 @@ use blindgrasp_shared::fault::{Fault, FaultConfig, Raised};
 use blindgrasp_shared::limit::{Limit, LimitConfig};
 use blindgrasp_shared::supervisor::{Mode, SupervisorConfig};
 use blindgrasp_shared::telemetry::Record;
-use blindgrasp_shared::tick::{Config, Input, Output, Params, State, tick};
+use blindgrasp_shared::tick::{Config, Input, Output, Params, Sensed, State, tick};
 use common::{JOINTS, SLEW_NM_S, TORQUE_NM, config, facing_counts, facing_rad, params};
 use proptest::prelude::*;
 
@@ -389,7 +389,7 @@ fn parameters_out_of_range_are_named_with_their_joint() {
     assert_eq!(error(|c| c.faults.speed_limit_rad_s = Some(with(1.0, 7, 0.0))), (name.to_owned(), Some(7)));
     assert_eq!(error(|c| c.faults.range_slack_rad = Some(-0.1)), ("faults.range_slack_rad".to_owned(), None));
     assert_eq!(error(|c| c.faults.saturated_ms = Some(u32::MAX)), ("faults.saturated_ms".to_owned(), None));
-    let supervisor = SupervisorConfig { soft_start_ms: 0, release_ms: u32::MAX };
+    let supervisor = SupervisorConfig { soft_start_ms: 0, release_ms: u32::MAX, amplifier_start_ms: 0 };
     let mut config = config();
     config.supervisor = supervisor;
     let told = TestParams::new(common::hand(), &config).unwrap_err().to_string();
@@ -688,5 +688,81 @@ proptest! {
             let output = tick(&params, &mut state, &Input::ideal(&angles, &speeds, None));
             prop_assert!(output.torques_nm.iter().all(|torque| torque.is_finite()));
         }
+    }
+}
+
+#[test]
+fn joints_that_passed_their_self_test_are_cleared_unless_something_else_is_wrong() {
+    let params = params(&config());
+    let raised = Raised::at(3, Fault::CounterReset);
+    let clear = Some(Command::ClearFault);
+    let mut counts = facing_counts();
+    let mut state = in_mode(&params, Mode::Grasping);
+    let mut turn = |counts: &[i32; 12], is_tested: bool, command| {
+        let input = Input::failed(raised, command);
+        let sensed = if is_tested { Sensed::Tested { raised, counts } } else { input.sensed };
+        let Output { torques_nm, powered, record } = tick(&params, &mut state, &Input { sensed, ..input });
+        assert_eq!((torques_nm, powered, record.reading_failed), ([0.0; 12], false, Some(raised)));
+        assert_eq!(record.counts.as_slice(), if is_tested { &counts[..] } else { &[] });
+        (record.mode, record.fault, record.answer.and_then(|answer| answer.refused))
+    };
+    let (held, persists) = ((Mode::Fault, Some(raised), None), Some(Refusal::FaultPersists));
+    // Even tested, they have to fail first.
+    assert_eq!(turn(&counts, true, clear), (Mode::Fault, Some(raised), persists));
+    assert_eq!(turn(&counts, false, clear), (Mode::Fault, Some(raised), persists));
+    assert_eq!(turn(&counts, true, None), held);
+    // A joint that would begin beyond its range.
+    counts[5] += 30_000;
+    assert_eq!(turn(&counts, true, clear), (Mode::Fault, Some(raised), persists));
+    counts[5] -= 30_000;
+    // Until its speed, which that was too, has faded.
+    (0..300).for_each(|_| assert_eq!(turn(&counts, true, None), held));
+    assert_eq!(turn(&counts, true, clear), (Mode::Disarmed, None, None));
+    // That they are tested is no reading of joints that work.
+    assert_eq!(turn(&counts, true, Some(Command::Arm)), (Mode::Fault, Some(raised), Some(Refusal::InFault)));
+}
+
+#[test]
+fn amplifiers_have_power_and_no_torque_while_they_start() {
+    let mut config = config();
+    config.supervisor.amplifier_start_ms = 7;
+    let (slow, fast) = (params(&config), params(&common::config()));
+    let run = |params: &TestParams, ticks: u32| {
+        let mut state = State::new();
+        let counts = facing_counts();
+        let mut outputs = Vec::new();
+        for k in 0..ticks {
+            let command = [Command::Arm, GRASP].get(k as usize).copied();
+            outputs.push(tick(params, &mut state, &Input::counts(&counts, command)));
+        }
+        outputs
+    };
+    let (slow, fast) = (run(&slow, 300), run(&fast, 300));
+    for outputs in [&slow, &fast] {
+        assert!(outputs.iter().all(|output| output.powered));
+    }
+    assert!(slow[..7].iter().all(|output| !has_torque(output)));
+    assert!(has_torque(&fast[0]) && has_torque(&slow[7]));
+    assert_eq!((slow[1].record.mode, slow[1].record.gains.grasp[0]), (Mode::Grasping, 0.0));
+    // Then the grasp goes on as one that began without waiting, once it has begun with its soft start.
+    let force = |output: &Output<12>| output.record.gains.grasp[0];
+    assert!(slow[7..].iter().map(force).eq(fast[1..].iter().take(293).map(force)));
+}
+
+#[test]
+fn a_supply_that_is_too_low_is_a_fault_until_it_is_not() {
+    let params = params(&config());
+    let counts = facing_counts();
+    let low = Events::NONE.with(Event::SupplyLow, true);
+    for mode in Mode::ALL.into_iter().filter(|&mode| mode != Mode::Fault) {
+        let mut state = in_mode(&params, mode);
+        // It is named before what it brings with it.
+        let output = tick(&params, &mut state, &missing(2).with(low));
+        assert_eq!((output.powered, output.torques_nm), (false, [0.0; 12]));
+        assert_eq!(output.record.fault, Some(Raised::of_hand(Fault::SupplyLow)), "{mode:?}");
+        let clear = Input::counts(&counts, Some(Command::ClearFault));
+        let refused = |output: &Output<12>| output.record.answer.and_then(|answer| answer.refused);
+        assert_eq!(refused(&tick(&params, &mut state, &clear.with(low))), Some(Refusal::FaultPersists));
+        assert_eq!(refused(&tick(&params, &mut state, &clear)), None);
     }
 }

@@ -10,7 +10,7 @@ use blindgrasp_shared::command::{Answer, Command, Grasp, Refusal};
 use blindgrasp_shared::control::{GAINS, Gain, LAWS, PerGain, PerSignal, SIGNALS, Signal};
 use blindgrasp_shared::event::{Event, Events};
 use blindgrasp_shared::fault::{Fault, Raised, Reaction};
-use blindgrasp_shared::identity::{Clock, Crash, CrashKind, Identity, Image, ResetCause, UNITS};
+use blindgrasp_shared::identity::{BrownOut, Clock, Crash, CrashKind, Identity, Image, ResetCause, UNITS};
 use blindgrasp_shared::limit::{Limit, Limiting};
 use blindgrasp_shared::link::message::{Packet, Reply, Request, Sample, Signals};
 use blindgrasp_shared::link::{FrameError, HearError, Heard, Listener, Receiver, Sender, encode, most_bytes};
@@ -175,6 +175,9 @@ const IDENTITY: Identity<'static> = Identity {
     clock: Clock::External,
     reset: ResetCause::PowerOn,
     crash: None,
+    brown_out: BrownOut::Level3,
+    clock_hz: 168_000_000,
+    most_baud: 1_000_000,
     changed: 0,
 };
 
@@ -763,6 +766,8 @@ fn the_tables_of_the_document_are_those_of_the_code() {
         ResetCause::Unknown,
     ];
     check(DOCUMENT, "resets", &table(three, &numbered(&causes, |cause| cause.words())));
+    let levels = [BrownOut::Level3, BrownOut::Level2, BrownOut::Level1, BrownOut::Off, BrownOut::Unknown];
+    check(DOCUMENT, "brown-out levels", &table(three, &numbered(&levels, |level| level.words())));
 }
 
 /// The tables of the Python client, written from those of the code.

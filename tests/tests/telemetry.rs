@@ -10,7 +10,7 @@ use blindgrasp::{MAX_FINGERS, MAX_JOINTS};
 use blindgrasp_shared::command::{Command, Grasp};
 use blindgrasp_shared::device::{Device, Inputs, Outputs, Reading};
 use blindgrasp_shared::fault::{Fault, FaultConfig, Raised};
-use blindgrasp_shared::identity::{Clock, Identity, Image, ResetCause, UNITS};
+use blindgrasp_shared::identity::{Clock, Identity, Image};
 use blindgrasp_shared::link::message::{Packet, Reply, Request, Signals};
 use blindgrasp_shared::link::{Listener, Receiver, Sender, most_bytes};
 use blindgrasp_shared::math::Real;
@@ -90,8 +90,7 @@ impl Line {
             period_us: 1000,
         };
         let clock = Clock::External;
-        let identity =
-            Identity { image, units: UNITS, clock, reset: ResetCause::Unknown, crash: None, changed: 0 };
+        let identity = Identity::of(image, clock);
         Self {
             device: Device::new(Params::new(scene.hand.cast(), config).expect("parameters"), identity),
             burst: Box::new(Burst::new()),
@@ -128,7 +127,8 @@ impl Line {
             self.sequence = self.sequence.wrapping_add(1);
             Packet { session: self.session, sequence: self.sequence, request }
         });
-        let inputs = Inputs { reading, late: false, cycles: 16_000, dropped: self.dropped, packet };
+        let inputs =
+            Inputs { reading, late: false, supply_low: false, cycles: 16_000, dropped: self.dropped, packet };
         let outputs = self.device.tick(&inputs, &mut self.burst);
         if let Some(reply) = &outputs.reply {
             if let Reply::Identity { session, .. } = reply {
@@ -399,7 +399,14 @@ fn the_burst_is_at_full_rate_whatever_the_decimation() {
         let packet =
             Packet { session: line.session, sequence: line.sequence, request: Request::Burst { index } };
         let packet = Some(packet);
-        let inputs = Inputs { reading: still, late: false, cycles: 0, dropped: line.dropped, packet };
+        let inputs = Inputs {
+            reading: still,
+            late: false,
+            supply_low: false,
+            cycles: 0,
+            dropped: line.dropped,
+            packet,
+        };
         match line.device.tick(&inputs, &mut line.burst).reply {
             Some(Reply::Burst { record, .. }) => ticks.push(record.tick),
             other => panic!("{other:?}"),

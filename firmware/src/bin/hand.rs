@@ -15,6 +15,7 @@ mod app {
     use blindgrasp_firmware::report::{self, LineReport};
     use blindgrasp_firmware::schedule;
     use blindgrasp_firmware::serial::{self, Bytes, Interrupt, Line};
+    use blindgrasp_firmware::supply;
     use stm32f4xx_hal::prelude::*;
     use stm32f4xx_hal::watchdog::IndependentWatchdog;
 
@@ -36,7 +37,8 @@ mod app {
     #[init(local = [bytes: Bytes = Bytes::new(), all_queues: Queues = Queues::new(), buses: Buses = Buses::new(), burst: HandBurst = HandBurst::new()])]
     fn init(mut cx: init::Context) -> (Shared, Local) {
         let device = cx.device;
-        let mut boot = Boot::new(device.RCC, &device.DBGMCU);
+        supply::start(&device.PWR, &device.EXTI, &device.RCC);
+        let mut boot = Boot::new(device.RCC, &device.DBGMCU, &device.FLASH);
         report::start(&boot, &IMAGE_HAND);
         let rcc = &mut boot.rcc;
         let (line_pins, joint_pins) = board::pins(device.GPIOA, device.GPIOB, device.GPIOC, rcc);
@@ -80,9 +82,20 @@ mod app {
     fn control(cx: control::Context) {
         let control::LocalResources { control, joints, queues, last, watchdog, .. } = cx.local;
         *last = task(control, joints, queues, *last);
+        // What the turn wrote may have come after the interrupt.
+        if supply::is_low() {
+            board::amplifiers_off();
+        }
         if let Some(watchdog) = watchdog {
             watchdog.feed();
         }
+    }
+
+    /// The supply sags: the amplifiers lose their power now, and the next tick finds the fault.
+    #[task(binds = PVD, priority = 4)]
+    fn supply_low(_: supply_low::Context) {
+        board::amplifiers_off();
+        supply::sagged();
     }
 
     /// A byte from the line: see [`serial`] for why this preempts the control task, and what it costs.

@@ -41,7 +41,7 @@ mod app {
     #[init(local = [bytes: Bytes = Bytes::new(), burst: HandBurst = HandBurst::new()])]
     fn init(mut cx: init::Context) -> (Shared, Local) {
         let device = cx.device;
-        let mut boot = Boot::new(device.RCC, &device.DBGMCU);
+        let mut boot = Boot::new(device.RCC, &device.DBGMCU, &device.FLASH);
         report::start(&boot, &IMAGE_PIL);
         let rcc = &mut boot.rcc;
         let (line_pins, _) = board::pins(device.GPIOA, device.GPIOB, device.GPIOC, rcc);

@@ -16,9 +16,14 @@
 //!   enable pin, and the DACs over SPI. A DAC that can't be reached any more would keep its last voltage. The driver reports it in every tick from then on, and uses the time
 //!   in which it need not read to repeat the self-test, one chip a tick; what is reported is what the last test
 //!   found, so that after one cable is mended the next one is named.
+//! - **Tested**, it reads the counts that the joints would begin with: those of the counters that kept their power, and
+//!   0 of the others. So what else is wrong is known before the fault is cleared.
 //! - **[`recover`](Joints::recover)** ends that, if the self-test has passed: it belongs to the user's command to clear
-//!   the fault. It takes little time, because all tests are done. Counters that kept their power go on with the count they
-//!   have; those that lost it count from 0 from that moment, so the joint has to be put to its starting posture before.
+//!   the fault, once the tick has taken it. It takes little time, because all tests are done. Counters that kept their
+//!   power go on with the count they have; those that lost it count from 0 from that moment, so the joint has to be put
+//!   to its starting posture before.
+//! - **The enable pin** is high only where the tick wants torque ([`write`](Joints::write)), after the first torque was
+//!   written: no torque does not hang on the DACs' zero.
 //!
 //! Boot is the same, without waiting: [`BoardJoints::new`] switches the outputs off before anything else, tests
 //! everything and starts, or comes back as failed.
@@ -39,11 +44,12 @@ pub trait Joints<const J: usize> {
     /// Reads the encoder counts of all joints.
     fn read(&mut self) -> Reading<J>;
 
-    /// Sets the torques of all joints, N m. A torque that is not a finite number sets 0 N m. What went wrong is
-    /// returned.
-    fn write(&mut self, torques_nm: &[f32; J]) -> Option<Raised>;
+    /// Sets the torques of all joints, N m, and whether the amplifiers have power. A torque that is not a finite number
+    /// sets 0 N m. What went wrong is returned.
+    fn write(&mut self, torques_nm: &[f32; J], powered: bool) -> Option<Raised>;
 
-    /// The user has cleared the fault: tries to work again. Whether it does, the next [`read`](Self::read) tells.
+    /// The user has cleared the fault: joints that have passed their self-test try to work again. Whether they do, the
+    /// next [`read`](Self::read) tells.
     fn recover(&mut self) {}
 }
 
@@ -145,7 +151,7 @@ impl fmt::Display for Failure {
 
 #[derive(Clone, Copy, Debug)]
 enum State {
-    /// Counters count, outputs are on and amplifiers enabled.
+    /// Counters count, and outputs are on.
     Running,
     /// Outputs are off; `step` is the next step of the self-test.
     Testing { failure: Failure, step: usize },
@@ -280,7 +286,27 @@ impl<C: SpiDevice, O: SpiDevice, E: OutputPin, const J: usize, const D: usize> B
         for (k, dac) in self.dacs.iter_mut().enumerate() {
             dac.start().map_err(|error| Failure::of_output(k, error))?;
         }
-        self.enable.set_high().map_err(|_| Failure { joint: 0, cause: Cause::Enable })
+        Ok(())
+    }
+
+    /// Gives the amplifiers power, or takes it.
+    fn enable(&mut self, powered: bool) -> Result<(), Failure> {
+        let set = if powered { self.enable.set_high() } else { self.enable.set_low() };
+        set.map_err(|_| Failure { joint: 0, cause: Cause::Enable })
+    }
+
+    /// The counts that the joints would begin with, were the fault cleared now.
+    fn first_counts(&mut self) -> Result<[i32; J], Failure> {
+        let mut counts = [0; J];
+        let counters = self.counters.iter_mut().zip(&self.zeros);
+        for (joint, ((counter, zero), count)) in counters.zip(&mut counts).enumerate() {
+            let found = match zero {
+                Zero::Kept => counter.read(),
+                Zero::Lost => counter.identify(tag(joint)).map(|()| 0),
+            };
+            *count = found.map_err(|error| Failure::of_counter(joint, error))?;
+        }
+        Ok(counts)
     }
 
     fn read_counts(&mut self) -> Result<[i32; J], Failure> {
@@ -327,11 +353,14 @@ impl<C: SpiDevice, O: SpiDevice, E: OutputPin, const J: usize, const D: usize> J
                 self.test(failure, step);
                 Reading::Failed(self.failure().unwrap_or(failure).raised())
             }
-            State::Tested { failure } => Reading::Failed(failure.raised()),
+            State::Tested { failure } => match self.first_counts() {
+                Ok(counts) => Reading::Tested { raised: failure.raised(), counts },
+                Err(failure) => Reading::Failed(self.fail(failure)),
+            },
         }
     }
 
-    fn write(&mut self, torques_nm: &[f32; J]) -> Option<Raised> {
+    fn write(&mut self, torques_nm: &[f32; J], powered: bool) -> Option<Raised> {
         if !matches!(self.state, State::Running) {
             // Once more: the first time may have been lost on the bus. What is wrong, `read` has told.
             switch_off(&mut self.enable, &mut self.dacs);
@@ -345,7 +374,12 @@ impl<C: SpiDevice, O: SpiDevice, E: OutputPin, const J: usize, const D: usize> J
                 raised = Some(Raised::at(joint, Fault::NotFinite));
             }
         }
-        match self.write_codes() {
+        // Power goes before the torques do, and comes after them.
+        let off = if powered { Ok(()) } else { self.enable(false) };
+        match off
+            .and_then(|()| self.write_codes())
+            .and_then(|()| if powered { self.enable(true) } else { Ok(()) })
+        {
             Ok(()) => raised,
             Err(failure) => Some(self.fail(failure)),
         }

@@ -456,7 +456,7 @@ impl Console {
         say(&firmware.words)?;
         let crash = firmware.crash.map_or("none".to_owned(), |crash| crash.to_string());
         say(format_args!("clock: {}; started by: {}", firmware.clock.words(), firmware.reset.words()))?;
-        say(format_args!("last crash: {crash}"))?;
+        say(format_args!("brown-out reset: {}; last crash: {crash}", firmware.brown_out.words()))?;
         let file = self.wanted_hand.as_deref().unwrap_or(&firmware.hand);
         self.hand = match HandModel::load(file) {
             Ok(hand) if hand.hash() == firmware.hand_hash => Some(hand),
@@ -518,7 +518,11 @@ impl Console {
             record.fault.map_or("none".to_owned(), |raised| format!("{raised}; {}", raised.fault.remedy())),
         );
         if let Some(raised) = record.reading_failed {
-            row("joints", format!("not read: {raised}"));
+            let state = match record.counts.as_slice() {
+                [] => "not read",
+                _ => "tested, `clear` brings them back",
+            };
+            row("joints", format!("{state}: {raised}"));
         }
         let gains = GAINS.iter().zip(record.gains.iter());
         let gains = gains.map(|(gain, value)| format!("{value} {}", gain.unit)).collect::<Vec<_>>();

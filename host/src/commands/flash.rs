@@ -2,6 +2,7 @@
 
 use super::Outcome;
 use blindgrasp::device::image::Kind;
+use blindgrasp::device::options::Level;
 use clap::Args;
 use std::path::PathBuf;
 
@@ -35,6 +36,10 @@ pub(crate) struct Arguments {
     /// Do not read the flash back
     #[arg(long)]
     no_verify: bool,
+    /// Set the chip's brown-out level too: an option byte, which the firmware only tells. On a read-protected chip this is
+    /// refused, before anything is erased
+    #[arg(long, value_enum, value_name = "LEVEL")]
+    brown_out: Option<Level>,
     /// Then show what the firmware logs, until Ctrl-C
     #[arg(long, conflicts_with = "json")]
     monitor: bool,
@@ -68,9 +73,10 @@ mod probe {
     use anyhow::{Context, bail};
     use blindgrasp::device::flash::logs::Logs;
     use blindgrasp::device::flash::monitor::{self, Event};
-    use blindgrasp::device::flash::probe::{attach, choose, describe};
+    use blindgrasp::device::flash::probe::{attach, choose, describe, with_options};
     use blindgrasp::device::flash::{Chip, Phase, Progress, download};
     use blindgrasp::device::image::{BUILD_HINT, ExpectedHand, Firmware, Footprint, Kind};
+    use blindgrasp::device::options;
     use blindgrasp::scene::HandModel;
     use indicatif::{ProgressBar, ProgressStyle};
     use probe_rs::probe::list::Lister;
@@ -106,6 +112,8 @@ mod probe {
         stack_bytes: u64,
         flashed: bool,
         verified: bool,
+        /// The brown-out level before, and as it was set.
+        brown_out: Option<[String; 2]>,
     }
 
     #[derive(Serialize)]
@@ -136,11 +144,18 @@ mod probe {
         let info = choose(&Lister::new(), arguments.probe.as_deref())?;
         eprintln!("blindgrasp: probe {}; the joints must be without power", describe(&info));
         let mut session = attach(&info, &chip)?;
+        if arguments.brown_out.is_some() {
+            with_options(&mut session, &chip, |core| options::unprotected(core).map(|_| ()))?;
+        }
         let bars = Bars::new();
         let verify = arguments.verify || !arguments.no_verify;
         let written = download(&mut session, &chip, &firmware, verify, |progress| bars.show(progress));
         bars.0.finish_and_clear();
         written?;
+        if let Some(level) = arguments.brown_out {
+            let before = with_options(&mut session, &chip, |core| options::set_brown_out(core, level))?;
+            report.brown_out = Some([before.to_string(), level.to_string()]);
+        }
         monitor::start(&mut session, firmware.rtt_control_block)?;
         (report.flashed, report.verified) = (true, verify);
         let outcome = print(&report, arguments.json)?;
@@ -224,6 +239,7 @@ mod probe {
             stack_bytes: footprint.stack_bytes,
             flashed: false,
             verified: false,
+            brown_out: None,
         }
     }
 
@@ -272,7 +288,11 @@ mod probe {
             ("RAM for the stack", kib(report.stack_bytes)),
             ("state", state.to_owned()),
         ];
-        lines.iter().map(|(name, value)| format!("{name:<22}{value}\n")).collect()
+        let brown_out = report
+            .brown_out
+            .iter()
+            .map(|[before, now]| ("brown-out reset", format!("{now}, {before} before")));
+        lines.into_iter().chain(brown_out).map(|(name, value)| format!("{name:<22}{value}\n")).collect()
     }
 
     /// One bar for one phase after the other; hidden where stderr is no terminal.

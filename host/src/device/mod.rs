@@ -1,7 +1,7 @@
 //! Firmware on a microcontroller, real or emulated.
 //!
 //! - [`image`]: what is in an image's file; [`build`]: where an image for processor in the loop comes from;
-//!   `flash` (feature `probe`): images onto a chip.
+//!   `flash` (feature `probe`): images onto a chip; [`options`]: its option bytes.
 //! - Processor in the loop, from the ground up: [`interrupt`], whether the user wants an end; [`transport`], bytes to and
 //!   from; `qemu`, the emulator as a process; [`client`], messages and answers; [`twin`], the firmware's double on the host;
 //!   [`pil`], a hand in a simulation whose controller is the firmware.
@@ -16,6 +16,7 @@ pub mod flash;
 pub mod image;
 pub mod interrupt;
 pub mod line;
+pub mod options;
 pub mod pil;
 #[cfg(unix)]
 pub mod pty;

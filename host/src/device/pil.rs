@@ -410,6 +410,7 @@ impl<P: Peer> Controller for Pilot<P> {
         let (counts, failed) = match turn.sensed {
             Sensed::Counts(counts) => (List::first_of(*counts, self.joint_count), None),
             Sensed::Failed(raised) => (List::default(), Some(raised)),
+            Sensed::Tested { raised, counts } => (List::first_of(*counts, self.joint_count), Some(raised)),
             Sensed::Ideal { .. } => return Err(PilError::IdealSensors),
         };
         let sample = Sample { counts, failed, late: turn.late };

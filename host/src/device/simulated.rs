@@ -16,7 +16,7 @@ use crate::wire::Packet;
 use crate::{MAX_FINGERS, MAX_JOINTS, sim};
 use blindgrasp_shared::device::{Device, Inputs, Outputs, Reading};
 use blindgrasp_shared::fault::{Fault, Raised};
-use blindgrasp_shared::identity::{Clock, Identity, Image, ResetCause, UNITS};
+use blindgrasp_shared::identity::{Clock, Identity, Image, ResetCause};
 use blindgrasp_shared::supervisor::Mode;
 use blindgrasp_shared::telemetry::INTERFACE_VERSION;
 use blindgrasp_shared::telemetry::burst::Burst;
@@ -122,14 +122,7 @@ impl SimulatedHand {
             fingertip_count: model.hand.fingertip_count() as u8,
             period_us: model.config.period_us,
         };
-        let identity = Identity {
-            image,
-            units: UNITS,
-            clock: Clock::External,
-            reset: ResetCause::PowerOn,
-            crash: None,
-            changed: 0,
-        };
+        let identity = Identity { reset: ResetCause::PowerOn, ..Identity::of(image, Clock::External) };
         Ok(Self {
             device: Device::new(params, identity),
             burst: Box::new(Burst::new()),
@@ -154,7 +147,7 @@ impl SimulatedHand {
     pub fn turn(&mut self, turn: Turn) -> (Outputs<MAX_JOINTS>, Option<Happening>) {
         let Turn { packet, late, dropped } = turn;
         // There is no processor whose cycles could be counted.
-        let inputs = Inputs { reading: self.read(), late, cycles: 0, dropped, packet };
+        let inputs = Inputs { reading: self.read(), late, supply_low: false, cycles: 0, dropped, packet };
         let outputs = self.device.tick(&inputs, &mut self.burst);
         let wanted_nm = self.delay.pass(outputs.torques_nm);
         let happened = self.move_on(outputs.record.mode, &wanted_nm);

@@ -6,7 +6,7 @@ use crate::wire::{Answer, Firmware, Packet, Sample, Turned};
 use crate::{MAX_FINGERS, MAX_JOINTS};
 use blindgrasp_shared::device::{Device, Inputs, Reading};
 use blindgrasp_shared::fault::{Fault, Raised};
-use blindgrasp_shared::identity::{Clock, Identity, Image, ResetCause, UNITS};
+use blindgrasp_shared::identity::{Clock, Identity, Image};
 use blindgrasp_shared::link::message::Reply;
 use blindgrasp_shared::parameter::ParameterError;
 use blindgrasp_shared::telemetry::INTERFACE_VERSION;
@@ -39,8 +39,7 @@ impl Twin {
             fingertip_count: hand.hand.fingertip_count() as u8,
             period_us: hand.config.period_us,
         };
-        let identity =
-            Identity { image, units: UNITS, clock, reset: ResetCause::Unknown, crash: None, changed: 0 };
+        let identity = Identity::of(image, clock);
         Ok(Self { device: Device::new(params, identity), burst: Box::new(Burst::new()) })
     }
 
@@ -48,14 +47,22 @@ impl Twin {
     pub fn tick(&mut self, packet: Option<&Packet>, sample: &Sample) -> Turned {
         let joint_count = self.device.params().hand().joint_count();
         let counts = sample.counts.as_slice();
+        let whole = counts.len() == joint_count;
+        let padded = std::array::from_fn(|k| counts.get(k).copied().unwrap_or(0));
         let reading = match sample.failed {
+            Some(raised) if whole => Reading::Tested { raised, counts: padded },
             Some(raised) => Reading::Failed(raised),
-            None if counts.len() != joint_count => {
-                Reading::Failed(Raised::at(counts.len(), Fault::SampleMissing))
-            }
-            None => Reading::Counts(std::array::from_fn(|k| counts.get(k).copied().unwrap_or(0))),
+            None if whole => Reading::Counts(padded),
+            None => Reading::Failed(Raised::at(counts.len(), Fault::SampleMissing)),
         };
-        let inputs = Inputs { reading, late: sample.late, cycles: 0, dropped: 0, packet: packet.cloned() };
+        let inputs = Inputs {
+            reading,
+            late: sample.late,
+            supply_low: false,
+            cycles: 0,
+            dropped: 0,
+            packet: packet.cloned(),
+        };
         let outputs = self.device.tick(&inputs, &mut self.burst);
         let answer = match outputs.reply {
             None | Some(Reply::Record(_) | Reply::Snapshot(_)) => None,

@@ -303,7 +303,7 @@ mod tests {
     use super::*;
     use crate::MAX_JOINTS;
     use crate::record::mcap::Writer;
-    use blindgrasp_shared::identity::{Clock, Identity, Image, ResetCause, UNITS};
+    use blindgrasp_shared::identity::{Clock, Identity, Image};
     use blindgrasp_shared::link::message::Reply;
     use blindgrasp_shared::telemetry::INTERFACE_VERSION;
     use std::path::PathBuf;
@@ -326,8 +326,7 @@ mod tests {
             fingertip_count: 3,
             period_us: 1000,
         };
-        let (clock, reset) = (Clock::External, ResetCause::PowerOn);
-        let about = About::of(&Identity { image, units: UNITS, clock, reset, crash: None, changed: 0 });
+        let about = About::of(&Identity::of(image, Clock::External));
         let mut writer = Writer::create(&path, false).expect("a file");
         let devices = [writer.add_device("hand1"), writer.add_device("hand2")];
         let at = |ms: u32| Stamp(BEGUN + u64::from(ms) * 1_000_000);

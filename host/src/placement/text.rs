@@ -121,6 +121,9 @@ fn settings(text: &mut String, file: &SceneFile) {
         control.estimator_bandwidth_hz,
         control.end_stops,
     );
+    if control.amplifier_start_ms != 0 {
+        let _ = writeln!(text, "amplifier_start_ms = {}", control.amplifier_start_ms);
+    }
     for (gain, value) in GAINS.iter().zip(control.gains.iter()).skip(control.gains.grasp.len()) {
         if *value != 0.0 {
             let _ = writeln!(text, "{} = {value:?}    # {}", gain.key, gain.words);

@@ -160,6 +160,7 @@ pub(super) fn control(control: &Control) -> Result<()> {
     }
     within("control.damping_scale", control.damping_scale, 0.0, 1e4)?;
     within("control.soft_start_s", control.soft_start_s, 0.0, LONGEST_RUN_S)?;
+    within("control.amplifier_start_ms", control.amplifier_start_ms.into(), 0.0, LONGEST_RUN_S * 1e3)?;
     // The tick's own bounds, so that the file and the key are named here.
     let fastest_hz = 1.0 / (std::f64::consts::PI * control.period_s);
     within(

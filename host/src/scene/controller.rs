@@ -92,6 +92,7 @@ impl Setup<'_> {
             supervisor: SupervisorConfig {
                 soft_start_ms: (control.soft_start_s * 1e3).round() as u32,
                 release_ms: safety.release_ms,
+                amplifier_start_ms: control.amplifier_start_ms,
             },
         }
     }

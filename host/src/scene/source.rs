@@ -138,7 +138,7 @@ structs! {
         possible_speed_rad_s speed_limit_rad_s range_slack_rad saturated_ms frozen_torque_nm frozen_neighbour_rad
         frozen_ms heartbeat_ms late_ticks energy_j
     }
-    impl [] SupervisorConfig as SupervisorConfig { soft_start_ms release_ms }
+    impl [] SupervisorConfig as SupervisorConfig { soft_start_ms release_ms amplifier_start_ms }
     impl [const J: usize] Config<J> as Config { period_us estimator laws limits faults supervisor }
 }
 

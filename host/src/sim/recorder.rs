@@ -7,7 +7,7 @@ use super::controller::Alone;
 use crate::record::mcap::{About, Device, RecordingError, Saved, Setting, Stamp, Writer};
 use crate::scene::{HandFile, Scene};
 use crate::{MAX_FINGERS, MAX_JOINTS};
-use blindgrasp_shared::identity::{Clock, Identity, Image, ResetCause, UNITS};
+use blindgrasp_shared::identity::{Clock, Identity, Image};
 use blindgrasp_shared::link::message::Reply;
 use blindgrasp_shared::telemetry::snapshot::{BYTES_PER_JOINT, PART_BYTES, Part};
 use blindgrasp_shared::telemetry::{INTERFACE_VERSION, List};
@@ -42,8 +42,8 @@ impl Recorder {
     ) -> Result<Self, RecordingError> {
         // The gains are the scene's, as they were its controller's.
         let hand = HandFile { control: Some(scene.control.clone()), ..scene.file.hand.clone() };
-        let mut about = About::of(&Identity {
-            image: Image {
+        let mut about = About::of(&Identity::of(
+            Image {
                 interface_version: INTERFACE_VERSION,
                 kind: "sim",
                 hand: &hand.name,
@@ -54,12 +54,8 @@ impl Recorder {
                 fingertip_count: u8::try_from(hand.fingertips.len()).unwrap_or(u8::MAX),
                 period_us: controller.params().period().microseconds(),
             },
-            units: UNITS,
-            clock: Clock::Emulated,
-            reset: ResetCause::PowerOn,
-            crash: None,
-            changed: 0,
-        })
+            Clock::Emulated,
+        ))
         .with_hand(&hand);
         about.hand_hash = about.hand_model().map_or(0, |model| model.hash());
         about.scene = Some(scene.effective_toml());

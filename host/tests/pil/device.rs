@@ -8,7 +8,7 @@ use blindgrasp::wire::{Packet, Record, Request, Sample};
 use blindgrasp::{MAX_FINGERS, MAX_JOINTS};
 use blindgrasp_shared::command::Refusal;
 use blindgrasp_shared::device::{Device, Inputs, Reading};
-use blindgrasp_shared::identity::{Clock, Identity, Image, ResetCause, UNITS};
+use blindgrasp_shared::identity::{Clock, Identity, Image};
 use blindgrasp_shared::link::message::{Reply, not_understood};
 use blindgrasp_shared::link::{Receiver, encode, most_bytes};
 use blindgrasp_shared::parameters::Parameter;
@@ -94,8 +94,7 @@ impl Firmware {
             _ => {}
         }
         let clock = Clock::Emulated;
-        let identity =
-            Identity { image, units: UNITS, clock, reset: ResetCause::Unknown, crash: None, changed: 0 };
+        let identity = Identity::of(image, clock);
         let params = Params::new(hand.hand.cast(), &hand.config).expect("parameters");
         Self {
             device: Device::new(params, identity),
@@ -134,7 +133,8 @@ impl Firmware {
             Reading::Failed,
         );
         let asked = packet.clone();
-        let inputs = Inputs { reading, late: sample.late, cycles: 1234, dropped: 0, packet };
+        let inputs =
+            Inputs { reading, late: sample.late, supply_low: false, cycles: 1234, dropped: 0, packet };
         let outputs = self.device.tick(&inputs, &mut self.burst);
         let mut record = outputs.record;
         if self.wrong == Wrong::Used {

@@ -99,7 +99,7 @@ fn device(model: &HandModel) -> Device<MAX_JOINTS, MAX_FINGERS> {
         period_us: model.config.period_us,
     };
     let reset = ResetCause::PowerOn;
-    let identity = Identity { image, units: UNITS, clock: Clock::External, reset, crash: None, changed: 0 };
+    let identity = Identity { reset, ..Identity::of(image, Clock::External) };
     Device::new(Params::new(model.hand.cast(), &model.config).unwrap(), identity)
 }
 
@@ -119,6 +119,8 @@ pub(crate) fn about(hand: &Hand) -> About {
         clock: "crystal".into(),
         reset: "power on".into(),
         crash: None,
+        brown_out: "unknown".into(),
+        clock_hz: 0,
         units: UNITS.into(),
         host_version: "0.1.0".into(),
         port: None,
@@ -203,7 +205,14 @@ impl Session {
             let payload = postcard::to_slice(packet, &mut self.buffer).unwrap().to_vec();
             self.writer.sent(self.recorded, self.now(), &payload).unwrap();
         }
-        let inputs = Inputs { reading, late, cycles: 10_003 + self.tick % 7, dropped: self.dropped, packet };
+        let inputs = Inputs {
+            reading,
+            late,
+            supply_low: false,
+            cycles: 10_003 + self.tick % 7,
+            dropped: self.dropped,
+            packet,
+        };
         let mut outputs = self.device.tick(&inputs, &mut self.burst);
         if let Some(reply) = outputs.reply.take() {
             if let Reply::Identity { session, .. } = reply {

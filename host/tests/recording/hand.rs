@@ -7,7 +7,7 @@ use blindgrasp_shared::command::{Answer, Command, Refusal};
 use blindgrasp_shared::control::PerGain;
 use blindgrasp_shared::event::{Event, Events};
 use blindgrasp_shared::fault::{Fault, Raised};
-use blindgrasp_shared::identity::{Clock, Identity, Image, ResetCause, UNITS};
+use blindgrasp_shared::identity::{BrownOut, Clock, Identity, Image};
 use blindgrasp_shared::limit::{Limit, Limiting};
 use blindgrasp_shared::link::message::{Reply, Signals};
 use blindgrasp_shared::link::{Receiver, Sender};
@@ -30,22 +30,23 @@ pub(crate) fn about(hand: &str) -> About {
     let file = HandFile::load(hand).unwrap();
     let model = HandModel::load(hand).unwrap();
     About::of(&Identity {
-        image: Image {
-            interface_version: INTERFACE_VERSION,
-            kind: "hand",
-            hand,
-            hand_hash: model.hash(),
-            firmware_version: "0.1.0",
-            build_hash: 0x0123_abcd,
-            joint_count: file.joints.len() as u8,
-            fingertip_count: file.fingertips.len() as u8,
-            period_us: 1000,
-        },
-        units: UNITS,
-        clock: Clock::External,
-        reset: ResetCause::PowerOn,
-        crash: None,
-        changed: 0,
+        brown_out: BrownOut::Level3,
+        clock_hz: 168_000_000,
+        most_baud: 1_000_000,
+        ..Identity::of(
+            Image {
+                interface_version: INTERFACE_VERSION,
+                kind: "hand",
+                hand,
+                hand_hash: model.hash(),
+                firmware_version: "0.1.0",
+                build_hash: 0x0123_abcd,
+                joint_count: file.joints.len() as u8,
+                fingertip_count: file.fingertips.len() as u8,
+                period_us: 1000,
+            },
+            Clock::External,
+        )
     })
     .with_hand(&file)
 }

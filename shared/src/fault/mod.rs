@@ -108,6 +108,9 @@ faults! {
     TooMuchEnergy    = 12, TorqueOff, "joints put more energy into the world than they may",
         "in the tick in which the work of the last second (fading) is above the drop of the law's potentials by more than `faults.energy_j`: a swing that is fed by delays or limits. The work is reckoned from the torques that are asked for and the turns that are counted, so that a motor or an encoder the wrong way round looks like somebody who pushes",
         "lower the force or raise the damping; look for joints whose limits cut off what the law asks for";
+    SupplyLow        = 13, TorqueOff, "supply of the microcontroller is too low",
+        "in the tick after the supply monitor's threshold was passed; the amplifiers lose their power before that, at once",
+        "check the supply, its wiring and what else draws from it";
 }
 
 impl From<Fault> for u8 {
@@ -187,6 +190,7 @@ mod tests {
             (10, Fault::LinkLost),
             (11, Fault::TickLate),
             (12, Fault::TooMuchEnergy),
+            (13, Fault::SupplyLow),
         ];
         assert_eq!(numbers.len(), Fault::ALL.len());
         for (number, fault) in numbers {
@@ -194,7 +198,7 @@ mod tests {
             assert_eq!(Fault::from_number(number), Some(fault));
             assert!(!fault.words().is_empty() && !fault.remedy().is_empty());
         }
-        for number in [0, 13, 255] {
+        for number in [0, 14, 255] {
             assert_eq!(Fault::try_from(number), Err(UnknownFault(number)));
         }
     }

@@ -76,7 +76,7 @@ pub enum Request<const J: usize> {
 pub struct Sample<const J: usize> {
     /// Encoder counts.
     pub counts: List<i32, J>,
-    /// Why there are none.
+    /// Why the joints could not be read or driven; with counts, they have passed their self-test since.
     pub failed: Option<Raised>,
     /// Whether the tick before is to count as late.
     pub late: bool,
@@ -224,7 +224,7 @@ impl<'a, const J: usize> Reply<'a, J> {
 
     /// Bytes that suffice for every reply of up to `J` joints.
     pub const MOST_BYTES: usize = {
-        let identity = 6 + Self::NAMES + 40;
+        let identity = 6 + Self::NAMES + 55;
         // Of a burst: with three numbers before it. A snapshot's part is shorter than an identity.
         let record = 9 + Record::<J>::MOST_BYTES;
         1 + if record > identity { record } else { identity }

@@ -1,10 +1,15 @@
 //! The probe that is meant, and a session on the right chip.
 
 use super::Chip;
+use crate::device::options::{OptionsError, Words};
 use probe_rs::probe::list::{Accessibility, Lister, ProbeListItem};
 use probe_rs::probe::{DebugProbeError, DebugProbeInfo, DebugProbeSelector, Probe};
-use probe_rs::{MemoryInterface, Permissions, Session};
+use probe_rs::{Core, MemoryInterface, Permissions, Session};
 use std::fmt::Write as _;
+use std::time::Duration;
+
+/// How long halting may take.
+const HALT_TIMEOUT: Duration = Duration::from_millis(500);
 
 /// Why there is no session.
 #[derive(Debug, thiserror::Error)]
@@ -72,6 +77,14 @@ pub enum ProbeError {
         /// What it is.
         found: String,
     },
+    /// Its option bytes are laid out in another way.
+    #[error(
+        "--brown-out knows the option bytes of an STM32F405, 407, 415 or 417, not those of {0}; nothing was changed"
+    )]
+    OtherOptions(String),
+    /// Its option bytes are not as they should be.
+    #[error(transparent)]
+    Options(#[from] OptionsError<probe_rs::Error>),
     /// It breaks off.
     #[error("the chip {0} stopped answering; check the wiring")]
     Lost(String, #[source] Box<probe_rs::Error>),
@@ -201,6 +214,45 @@ pub fn contradiction(chip: &str, flash_bytes: u64, idcode: u32, flash_kib: u16) 
     }
     let smaller = u64::from(flash_kib) * 1024 < flash_bytes;
     smaller.then(|| format!("a variant with {flash_kib} KiB of flash in place of {}", flash_bytes / 1024))
+}
+
+/// A halted core as what option bytes are read and written through.
+pub struct Halted<'a, 'b>(pub &'a mut Core<'b>);
+
+impl Words for Halted<'_, '_> {
+    type Error = probe_rs::Error;
+
+    fn read(&mut self, address: u64) -> Result<u32, probe_rs::Error> {
+        self.0.read_word_32(address)
+    }
+
+    fn write(&mut self, address: u64, word: u32) -> Result<(), probe_rs::Error> {
+        self.0.write_word_32(address, word)
+    }
+}
+
+/// Looks at the option bytes of a chip that has them as an STM32F4 does, with its core halted, or changes them.
+///
+/// # Errors
+/// It is another chip, or what `act` says.
+pub fn with_options<T>(
+    session: &mut Session,
+    chip: &Chip,
+    act: impl FnOnce(&mut Halted<'_, '_>) -> Result<T, OptionsError<probe_rs::Error>>,
+) -> Result<T, ProbeError> {
+    if !has_option_register(chip) {
+        return Err(ProbeError::OtherOptions(chip.name().to_owned()));
+    }
+    let lost = |error| ProbeError::Lost(chip.name().to_owned(), Box::new(error));
+    let mut core = session.core(0).map_err(lost)?;
+    core.halt(HALT_TIMEOUT).map_err(lost)?;
+    Ok(act(&mut Halted(&mut core))?)
+}
+
+/// Chips whose option register is the one of RM0090, section on the STM32F405, 407, 415 and 417.
+fn has_option_register(chip: &Chip) -> bool {
+    let name = chip.name().to_ascii_uppercase();
+    DEVICES.iter().any(|(code, names)| *code == 0x413 && names.iter().any(|start| name.starts_with(start)))
 }
 
 fn check_device(session: &mut Session, chip: &Chip) -> Result<(), ProbeError> {

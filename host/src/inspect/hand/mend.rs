@@ -211,6 +211,7 @@ fn mend_control(control: &mut Control, key: &str) {
         "attitude_stiffness_nm" => control.gains.grasp[1] = 0.0,
         "damping_scale" => control.damping_scale = 1.0,
         "soft_start_s" => control.soft_start_s = 0.0,
+        "amplifier_start_ms" => control.amplifier_start_ms = 0,
         "estimator_bandwidth_hz" => control.estimator_bandwidth_hz = 0.05 / control.period_s,
         _ => {}
     }

@@ -37,6 +37,12 @@ pub struct About {
     pub reset: String,
     /// How it ended before, in words, if that was not in order.
     pub crash: Option<String>,
+    /// Level of its brown-out reset, in words.
+    #[serde(default)]
+    pub brown_out: String,
+    /// Frequency of the clock that its cycles are counted in, Hz; 0 where nothing counts them.
+    #[serde(default)]
+    pub clock_hz: u32,
     /// Units on the wire.
     pub units: String,
     /// Release of the program that recorded.
@@ -70,6 +76,8 @@ impl About {
             clock: identity.clock.words().into(),
             reset: identity.reset.words().into(),
             crash: identity.crash.map(|crash| crash.to_string()),
+            brown_out: identity.brown_out.words().into(),
+            clock_hz: identity.clock_hz,
             units: identity.units.into(),
             host_version: env!("CARGO_PKG_VERSION").into(),
             port: None,

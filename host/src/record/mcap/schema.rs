@@ -262,6 +262,8 @@ pub(super) fn of_about() -> Value {
             "clock": text("What gives the device its time"),
             "reset": text("Why it started"),
             "crash": maybe("How it ended before, if that was not in order"),
+            "brown_out": text("Level of the microcontroller's brown-out reset"),
+            "clock_hz": number("Frequency of the clock that cycles are counted in, Hz; 0 where nothing counts them"),
             "units": text("Units on the wire"),
             "host_version": text("Release of the program that recorded"),
             "port": maybe("The port"),

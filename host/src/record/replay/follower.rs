@@ -513,7 +513,8 @@ impl Follower {
         let counts = std::array::from_fn(|k| record.counts.as_slice().get(k).copied().unwrap_or(0));
         let input = Input {
             sensed: match record.reading_failed {
-                Some(raised) => Sensed::Failed(raised),
+                Some(raised) if record.counts.as_slice().is_empty() => Sensed::Failed(raised),
+                Some(raised) => Sensed::Tested { raised, counts: &counts },
                 None => Sensed::Counts(&counts),
             },
             events: record.events,

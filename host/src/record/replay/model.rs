@@ -80,7 +80,7 @@ mod tests {
     use super::*;
     use crate::scene::HandFile;
     use blindgrasp_shared::fault::FaultConfig;
-    use blindgrasp_shared::identity::{Clock, Identity, Image, ResetCause, UNITS};
+    use blindgrasp_shared::identity::{Clock, Identity, Image};
     use blindgrasp_shared::limit::LimitConfig;
     use blindgrasp_shared::telemetry::INTERFACE_VERSION;
 
@@ -99,9 +99,7 @@ mod tests {
             fingertip_count: 3,
             period_us: 1000,
         };
-        let (clock, reset) = (Clock::External, ResetCause::PowerOn);
-        let about = About::of(&Identity { image, units: UNITS, clock, reset, crash: None, changed: 0 })
-            .with_hand(&file);
+        let about = About::of(&Identity::of(image, Clock::External)).with_hand(&file);
         let recorded = Model::new(&about, None).unwrap();
         let mut configs = vec![model.config];
         // Everything that can be switched is on in the hand's file: off, in turns.

@@ -75,6 +75,8 @@ control! {
     period_s: f64 = 1e-3;
     /// Time over which `f_d` rises from zero, s.
     soft_start_s: f64 = 0.0;
+    /// Time that the motors' amplifiers take to start after they got power, ms: so long after `Arm` there is no torque.
+    amplifier_start_ms: u32 = 0;
     /// Bandwidth of the estimate of joint angles and speeds from the encoder counts, Hz. Ideal sensors need no estimate.
     estimator_bandwidth_hz: f64 = 50.0;
     /// Whether soft end stops keep the joints within their limits.

@@ -224,6 +224,7 @@ impl<'a> Draft<'a> {
              gravity_compensation = true           # gravity along -z of the base frame: the palm looks up\n\
              period_s = 1e-3\n\
              soft_start_s = 0.3\n\
+             amplifier_start_ms = 0                # whole ms from power to torque, by the amplifiers' data sheet; over the line it can only be made longer\n\
              estimator_bandwidth_hz = 50.0\n\
              end_stops = true\n\n\
              [joint_defaults]\n\
