@@ -19,7 +19,7 @@ use std::error::Error;
 use std::path::{Path, PathBuf};
 use std::{env, fs};
 
-#[path = "src/capacity.rs"]
+#[path = "src/boards/stm32f405/capacity.rs"]
 mod capacity;
 
 type Result<T> = std::result::Result<T, Box<dyn Error>>;

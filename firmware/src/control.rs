@@ -7,9 +7,9 @@ use crate::model::{FINGERS, JOINTS};
 use crate::queue::HandPacket;
 #[cfg(target_os = "none")]
 use crate::{
+    board::supply,
     queue::{ControlEnd, Telemetry},
     schedule::Turn,
-    supply,
 };
 use blindgrasp_shared::command::{Answer, Command};
 use blindgrasp_shared::device::{Device, Inputs, Outputs, Reading};

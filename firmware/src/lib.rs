@@ -1,5 +1,6 @@
-//! What runs on the STM32F405 around the shared [`Device`](blindgrasp_shared::device::Device): wiring, and drivers.
-//! What the hand does is decided there; here are pins, clocks, queues and interrupts.
+//! What runs on the microcontroller around the shared [`Device`](blindgrasp_shared::device::Device): wiring, and drivers.
+//! What the hand does is decided there; here are pins, clocks, queues and interrupts. What is true of one board
+//! alone is in that board's folder ([`boards`]).
 //!
 //! ```text
 //!  priority 3   USART2 --byte--+
@@ -18,25 +19,16 @@
 #[cfg(test)]
 extern crate std;
 
-pub mod bus;
+pub mod boards;
 pub mod control;
 pub mod joints;
 pub mod link;
 pub mod model;
 pub mod pil;
 pub mod queue;
-pub mod reset;
 
 #[cfg(target_os = "none")]
 pub mod bench;
-#[cfg(target_os = "none")]
-pub mod board;
-#[cfg(target_os = "none")]
-pub mod boot;
-#[cfg(target_os = "none")]
-mod capacity;
-#[cfg(target_os = "none")]
-pub mod clock;
 #[cfg(target_os = "none")]
 pub mod crash;
 #[cfg(all(target_os = "none", not(feature = "no-panic")))]
@@ -45,10 +37,9 @@ pub mod report;
 pub mod schedule;
 #[cfg(target_os = "none")]
 pub mod semihosting;
-#[cfg(target_os = "none")]
-pub mod serial;
-#[cfg(target_os = "none")]
-pub mod supply;
+
+/// The board that the images are for.
+pub use boards::stm32f405 as board;
 
 #[cfg(all(target_os = "none", not(feature = "no-panic")))]
 use defmt_rtt as _;

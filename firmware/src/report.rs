@@ -1,8 +1,9 @@
 //! Logs: how the start went, and what is wrong with the line. Written by `idle` alone, to RTT, where what finds no
 //! room is dropped.
 
-use crate::boot::Boot;
-use crate::{schedule, serial};
+use crate::board::boot::Boot;
+use crate::board::serial;
+use crate::schedule;
 use blindgrasp_shared::identity::{CrashKind, Image};
 use blindgrasp_shared::link::Counters;
 

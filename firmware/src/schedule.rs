@@ -6,12 +6,9 @@ use core::sync::atomic::{AtomicU32, Ordering};
 use cortex_m::peripheral::syst::SystClkSource;
 use cortex_m::peripheral::{DCB, DWT, SCB, SYST};
 
-/// Frequency of the timer in QEMU, whatever the clock tree says, Hz.
-const EMULATED_HZ: u32 = 168_000_000;
-
-/// Starts the timer's interrupt with a period, us. The counter has 24 bits: at 168 MHz, 99 ms.
+/// Starts the timer's interrupt with a period, us. The counter has 24 bits.
 pub fn start(timer: &mut SYST, period_us: u32, emulated: bool) {
-    let clock_hz = if emulated { EMULATED_HZ } else { board::SYSTEM_CLOCK.raw() };
+    let clock_hz = if emulated { board::EMULATED_HZ } else { board::SYSTEM_CLOCK.raw() };
     timer.set_clock_source(SystClkSource::Core);
     timer.set_reload(clock_hz / 1_000_000 * period_us - 1);
     timer.clear_current();

@@ -555,7 +555,7 @@ mod tests {
         for fault in Fault::ALL {
             faults.push(postcard::to_slice(fault, &mut buffer).unwrap().to_vec());
         }
-        assert_eq!(bytes(faults), "0102030405060708090a0b0c");
+        assert_eq!(bytes(faults), "0102030405060708090a0b0c0d");
     }
 
     #[test]

@@ -4,20 +4,18 @@
 #![cfg_attr(target_os = "none", allow(unsafe_code))]
 
 #[cfg(target_os = "none")]
-#[rtic::app(device = stm32f4xx_hal::pac, peripherals = true)]
+#[rtic::app(device = blindgrasp_firmware::board::pac, peripherals = true)]
 mod app {
+    use blindgrasp_firmware::board::boot::Boot;
+    use blindgrasp_firmware::board::serial::{self, Bytes, Interrupt, Line};
+    use blindgrasp_firmware::board::supply;
     use blindgrasp_firmware::board::{self, Buses, HandJoints};
-    use blindgrasp_firmware::boot::Boot;
     use blindgrasp_firmware::control::{Control, HandBurst, Timing, task};
     use blindgrasp_firmware::link::Link;
     use blindgrasp_firmware::model::IMAGE_HAND;
     use blindgrasp_firmware::queue::{ControlEnd, Queues};
     use blindgrasp_firmware::report::{self, LineReport};
     use blindgrasp_firmware::schedule;
-    use blindgrasp_firmware::serial::{self, Bytes, Interrupt, Line};
-    use blindgrasp_firmware::supply;
-    use stm32f4xx_hal::prelude::*;
-    use stm32f4xx_hal::watchdog::IndependentWatchdog;
 
     #[shared]
     struct Shared {}
@@ -30,7 +28,7 @@ mod app {
         queues: ControlEnd<'static>,
         last: Timing,
         /// On hardware.
-        watchdog: Option<IndependentWatchdog>,
+        watchdog: Option<board::Watchdog>,
         link: Link<'static, Line>,
     }
 
@@ -49,12 +47,7 @@ mod app {
         let controller = boot.device(&IMAGE_HAND);
         let period_us = controller.params().config().period_us;
 
-        let watchdog = (!boot.is_emulated()).then(|| {
-            let mut watchdog = IndependentWatchdog::new(device.IWDG);
-            watchdog.stop_on_debug(&device.DBGMCU, true);
-            watchdog.start(board::WATCHDOG_MS.millis());
-            watchdog
-        });
+        let watchdog = (!boot.is_emulated()).then(|| board::watchdog(device.IWDG, &device.DBGMCU));
         schedule::start_cycle_counter(&mut cx.core.DCB, &mut cx.core.DWT);
         schedule::start(&mut cx.core.SYST, period_us, boot.is_emulated());
         let local = Local {
@@ -124,6 +117,6 @@ mod app {
 
 #[cfg(not(target_os = "none"))]
 fn main() {
-    eprintln!("this is an image for an STM32F405: build it with --target thumbv7em-none-eabihf");
+    eprintln!("this is an image for a microcontroller: build it with --target thumbv7em-none-eabihf");
     std::process::exit(2);
 }

@@ -14,15 +14,15 @@
 #![cfg_attr(target_os = "none", allow(unsafe_code))]
 
 #[cfg(target_os = "none")]
-#[rtic::app(device = stm32f4xx_hal::pac, peripherals = true)]
+#[rtic::app(device = blindgrasp_firmware::board::pac, peripherals = true)]
 mod app {
-    use blindgrasp_firmware::boot::Boot;
+    use blindgrasp_firmware::board::boot::Boot;
+    use blindgrasp_firmware::board::serial::{self, Bytes, Interrupt, Line};
     use blindgrasp_firmware::control::{Control, HandBurst};
     use blindgrasp_firmware::link::Port;
     use blindgrasp_firmware::model::IMAGE_PIL;
     use blindgrasp_firmware::pil::{Lockstep, Way};
     use blindgrasp_firmware::semihosting::{self, Access, File};
-    use blindgrasp_firmware::serial::{self, Bytes, Interrupt, Line};
     use blindgrasp_firmware::{bench, board, report, schedule};
     use cortex_m::peripheral::SYST;
 
@@ -146,6 +146,6 @@ mod app {
 
 #[cfg(not(target_os = "none"))]
 fn main() {
-    eprintln!("this is an image for an STM32F405: build it with --target thumbv7em-none-eabihf");
+    eprintln!("this is an image for a microcontroller: build it with --target thumbv7em-none-eabihf");
     std::process::exit(2);
 }

@@ -455,8 +455,10 @@ impl Console {
         (self.joint_count, self.period_us) = (firmware.joint_count, period_us);
         say(&firmware.words)?;
         let crash = firmware.crash.map_or("none".to_owned(), |crash| crash.to_string());
-        say(format_args!("clock: {}; started by: {}", firmware.clock.words(), firmware.reset.words()))?;
-        say(format_args!("brown-out reset: {}; last crash: {crash}", firmware.brown_out.words()))?;
+        let Firmware { clock, reset, brown_out, .. } = firmware;
+        let (clock, reset, brown_out) = (clock.words(), reset.words(), brown_out.words());
+        say(format_args!("clock: {clock}; started by: {reset}; brown-out reset: {brown_out}"))?;
+        say(format_args!("last crash: {crash}"))?;
         let file = self.wanted_hand.as_deref().unwrap_or(&firmware.hand);
         self.hand = match HandModel::load(file) {
             Ok(hand) if hand.hash() == firmware.hand_hash => Some(hand),

@@ -26,7 +26,7 @@ use tempfile::TempDir;
 
 /// The program.
 const PROGRAM: &str = "qemu-system-arm";
-/// The board with an STM32F405.
+/// A board with the microcontroller that images are built for.
 const MACHINE: &str = "netduinoplus2";
 /// What is kept of what QEMU prints, bytes.
 const KEPT: usize = 4096;

@@ -5,7 +5,7 @@ use std::io;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
-/// Speed of the firmware's serial line, baud (`firmware/src/board.rs`).
+/// Speed of the serial line that every firmware begins with, baud.
 pub const BAUD: u32 = 1_000_000;
 /// How long nothing is looked at but the line.
 const SLICE: Duration = Duration::from_millis(100);

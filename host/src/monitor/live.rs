@@ -334,11 +334,12 @@ impl Follower {
     }
 
     fn greet(&self, firmware: Firmware, period_us: u32, number: Option<u16>) {
-        let Firmware { words, hand: hand_name, hand_hash, joint_count, .. } = firmware;
+        let Firmware { words, hand: hand_name, hand_hash, joint_count, clock_hz, .. } = firmware;
         let hand = known_hand(self.hand.as_deref(), &hand_name, hand_hash);
         self.note(Level::Info, format!("a session: {words}"));
         let firmware = words.split(',').next().unwrap_or_default().to_owned();
-        let session = Session { number, firmware, hand_name, hand_hash, joint_count, period_us, hand };
+        let session =
+            Session { number, firmware, hand_name, hand_hash, joint_count, period_us, clock_hz, hand };
         self.news(News::Open(Box::new(session)));
     }
 

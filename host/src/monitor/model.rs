@@ -17,8 +17,6 @@ use blindgrasp_shared::supervisor::{self, Mode, Outcome};
 use std::collections::VecDeque;
 use std::time::Duration;
 
-/// Processor cycles a second, if the processor is the one that the firmware is for (`firmware/src/board.rs`).
-const PROCESSOR_HZ: f64 = 168e6;
 /// Bits on the wire a byte: with start and stop bit.
 const BITS_A_BYTE: f64 = 10.0;
 /// Over which the speed of a joint is the mean, s: a count is 0.3 mrad.
@@ -52,6 +50,8 @@ pub struct Session {
     pub joint_count: usize,
     /// Time from one of its ticks to the next, us.
     pub period_us: u32,
+    /// Frequency of the clock that its cycles are counted in, Hz; 0 where nothing counts them.
+    pub clock_hz: u32,
     /// Its hand, or why that is not known.
     pub hand: Result<Box<HandModel>, String>,
 }
@@ -462,7 +462,8 @@ impl Model {
     /// Share of the tick's time that the last one took; `None` where nothing counts it.
     pub fn tick_share(&self) -> Option<f64> {
         let cycles = self.record()?.cycles;
-        (cycles > 0).then(|| f64::from(cycles) / (PROCESSOR_HZ * self.period_s()))
+        let clock_hz = self.session.as_ref()?.clock_hz;
+        (cycles > 0 && clock_hz > 0).then(|| f64::from(cycles) / (f64::from(clock_hz) * self.period_s()))
     }
 
     /// Time since the device's start, s, in the newest record.
@@ -576,6 +577,7 @@ pub(super) mod tests {
             hand_hash,
             joint_count: 12,
             period_us: 1000,
+            clock_hz: 100_000_000,
             hand,
         }))
     }
@@ -587,7 +589,7 @@ pub(super) mod tests {
         Record {
             sequence: tick,
             tick,
-            cycles: 16_800,
+            cycles: 10_000,
             decimation: 1,
             counts: List::first_of(counts, 12),
             torques_nm: List::first_of([0.25; crate::MAX_JOINTS], 12),

@@ -289,6 +289,7 @@ fn session(about: &About, hand: Option<&str>, number: Option<u16>) -> Session {
         hand_hash: about.hand_hash,
         joint_count: about.joint_count.into(),
         period_us: about.period_us,
+        clock_hz: about.clock_hz,
         hand: match recorded {
             Some(hand) => Ok(Box::new(hand)),
             None => known_hand(hand, &about.hand, about.hand_hash),

@@ -8,7 +8,7 @@
 //! deadlines that it was designed for, but does not arm: the oscillator may be off by 1 % at 25 °C and by up to 8 %
 //! over temperature (DS8626, HSI oscillator characteristics), and so would be every speed and every time.
 
-use crate::board;
+use super::wiring;
 use blindgrasp_shared::identity::Clock;
 use stm32f4xx_hal::pac::{DBGMCU, RCC};
 use stm32f4xx_hal::prelude::*;
@@ -30,10 +30,10 @@ pub fn start(rcc: RCC, emulated: bool) -> (Rcc, Clock) {
         return (rcc.constrain(), Clock::Emulated);
     }
     if crystal {
-        (rcc.freeze(Config::hse(board::CRYSTAL).sysclk(board::SYSTEM_CLOCK)), Clock::External)
+        (rcc.freeze(Config::hse(wiring::CRYSTAL).sysclk(wiring::SYSTEM_CLOCK)), Clock::External)
     } else {
         rcc.cr().modify(|_, w| w.hseon().off());
-        (rcc.freeze(Config::hsi().sysclk(board::SYSTEM_CLOCK)), Clock::Fallback)
+        (rcc.freeze(Config::hsi().sysclk(wiring::SYSTEM_CLOCK)), Clock::Fallback)
     }
 }
 

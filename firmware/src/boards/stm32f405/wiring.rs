@@ -19,30 +19,35 @@
 
 #![allow(unsafe_code)]
 
-use crate::bus::{Device, SharedBus};
-use crate::capacity::MOST_JOINTS;
+use super::capacity::MOST_JOINTS;
+use super::serial::LinePins;
 use crate::joints::dac::{self, CHANNELS};
 use crate::joints::ls7366r::{self, FilterClock};
 use crate::joints::{BoardJoints, JointsConfig, OutputConfig};
 use crate::model::{JOINTS, TORQUES_PER_VOLT_NM_V};
-use crate::serial::LinePins;
 use core::array;
 use core::convert::Infallible;
 use core::mem::MaybeUninit;
 use embedded_hal::delay::DelayNs;
 use embedded_hal::digital::{ErrorType, OutputPin};
+use embedded_hal_bus::spi::AtomicDevice;
+use embedded_hal_bus::util::AtomicCell;
 use stm32f4xx_hal::gpio::{self, Output, PB0, Pin, PinState, PushPull, Speed};
-use stm32f4xx_hal::pac::{GPIOA, GPIOB, GPIOC, SPI1, SPI2};
+use stm32f4xx_hal::pac::{DBGMCU, GPIOA, GPIOB, GPIOC, IWDG, SPI1, SPI2};
 use stm32f4xx_hal::prelude::*;
 use stm32f4xx_hal::rcc::Rcc;
 use stm32f4xx_hal::spi::Spi;
 use stm32f4xx_hal::time::Hertz;
+use stm32f4xx_hal::watchdog::IndependentWatchdog;
 
 /// The crystal.
 pub const CRYSTAL: Hertz = Hertz::MHz(8);
 
 /// The system clock: the most that the STM32F405 may have. APB1 gets a quarter of it (42 MHz), APB2 half (84 MHz).
 pub const SYSTEM_CLOCK: Hertz = Hertz::MHz(168);
+
+/// Frequency of the processor's timer in QEMU, whatever the clock tree says, Hz.
+pub const EMULATED_HZ: u32 = 168_000_000;
 
 /// The line, baud: 42 MHz / 1 Mbaud = 42 sixteenths of 16 samples, without error. A byte takes 10 us, so a millisecond
 /// has room for 100 bytes each way.
@@ -51,7 +56,18 @@ pub const BAUD: u32 = 1_000_000;
 /// The independent watchdog. Its oscillator is between 17 and 47 kHz where 32 are meant (DS8626, LSI oscillator
 /// characteristics), so that this is between 7 and 19 ms: some ticks may be late, but a control task that stands
 /// still is reset soon.
-pub const WATCHDOG_MS: u32 = 10;
+const WATCHDOG_MS: u32 = 10;
+
+/// The independent watchdog.
+pub type Watchdog = IndependentWatchdog;
+
+/// Starts the independent watchdog. It waits while a debugger halts the processor.
+pub fn watchdog(watchdog: IWDG, debug: &DBGMCU) -> Watchdog {
+    let mut watchdog = IndependentWatchdog::new(watchdog);
+    watchdog.stop_on_debug(debug, true);
+    watchdog.start(WATCHDOG_MS.millis());
+    watchdog
+}
 
 /// The counters' clock. The LS7366R takes SCK times of 100 ns high and 100 ns low at 5 V, a little more at 3.3 V; SPI1
 /// divides 84 MHz by a power of two: 84 / 32 = 2.625 MHz, 190 ns each. What a tick reads of 12 counters, 704 bits with their
@@ -74,15 +90,15 @@ const DACS: usize = JOINTS.div_ceil(CHANNELS);
 // build.rs has said so before, in words.
 const _: () = assert!(JOINTS <= MOST_JOINTS, "the hand has more joints than the board has counters for");
 
-type Counter = Device<'static, Spi<SPI1>, Select, Wait>;
-type Dac = Device<'static, Spi<SPI2>, Select, Wait>;
+type Counter = AtomicDevice<'static, Spi<SPI1>, Select, Wait>;
+type Dac = AtomicDevice<'static, Spi<SPI2>, Select, Wait>;
 
 /// The real joints of this hand.
 pub type HandJoints = BoardJoints<Counter, Dac, PB0<Output<PushPull>>, JOINTS, DACS>;
 /// The bus of the counters.
-pub type CounterBus = SharedBus<Spi<SPI1>>;
+pub type CounterBus = AtomicCell<Spi<SPI1>>;
 /// The bus of the DACs.
-pub type DacBus = SharedBus<Spi<SPI2>>;
+pub type DacBus = AtomicCell<Spi<SPI2>>;
 
 /// A chip-select pin of any port. The HAL's pins of unknown number check the number at each use, and that is a panic
 /// that the control task could reach.
@@ -188,8 +204,8 @@ pub fn amplifiers_off() {
 
 /// Memory of the two buses, for as long as the program runs.
 pub struct Buses {
-    counters: MaybeUninit<SharedBus<Spi<SPI1>>>,
-    dacs: MaybeUninit<SharedBus<Spi<SPI2>>>,
+    counters: MaybeUninit<CounterBus>,
+    dacs: MaybeUninit<DacBus>,
 }
 
 impl Buses {
@@ -216,16 +232,22 @@ pub fn joints(
     let (sck, miso, mosi) = pins.counter_bus;
     let wires = (Some(sck.into_alternate::<5>().speed(Speed::Medium)), Some(miso), Some(mosi));
     let counters = Spi::new(spi1, wires, ls7366r::SPI_MODE, COUNTER_CLOCK, rcc);
-    let counters = &*buses.counters.write(SharedBus::new(counters));
+    let counters = &*buses.counters.write(AtomicCell::new(counters));
     let (sck, miso, mosi) = pins.dac_bus;
     let wires = (Some(sck.into_alternate::<5>().speed(Speed::Medium)), Some(miso), Some(mosi));
     let dacs = Spi::new(spi2, wires, dac::SPI_MODE, DAC_CLOCK, rcc);
-    let dacs = &*buses.dacs.write(SharedBus::new(dacs));
+    let dacs = &*buses.dacs.write(AtomicCell::new(dacs));
 
     let mut selects = pins.counters.into_iter();
-    let counters = array::from_fn(|_| Device::new(counters, selects.next().expect(ENOUGH), Wait));
+    let counters = array::from_fn(|_| {
+        let Ok(counter) = AtomicDevice::new(counters, selects.next().expect(ENOUGH), Wait);
+        counter
+    });
     let mut selects = pins.dacs.into_iter();
-    let dacs = array::from_fn(|_| Device::new(dacs, selects.next().expect(ENOUGH), Wait));
+    let dacs = array::from_fn(|_| {
+        let Ok(dac) = AtomicDevice::new(dacs, selects.next().expect(ENOUGH), Wait);
+        dac
+    });
     let outputs = TORQUES_PER_VOLT_NM_V.map(|nm_per_volt| OutputConfig { nm_per_volt });
     let config = JointsConfig { filter_clock: FILTER_CLOCK, outputs };
     HandJoints::new(counters, dacs, pins.enable, &config).expect("the build has checked the hand's scales")

@@ -8,7 +8,7 @@
 //! Sending by polling costs nothing that matters: it is done when there is nothing else to do. (Besides, QEMU 7.2 never
 //! raises the interrupt of an empty transmitter.)
 
-use crate::board;
+use super::wiring;
 use crate::link::Port;
 use crate::queue::{dequeue, enqueue};
 use core::sync::atomic::{AtomicU32, Ordering};
@@ -53,7 +53,7 @@ pub fn start(
     bytes: &'static mut Bytes,
     rcc: &mut Rcc,
 ) -> Result<(Interrupt, Line), InvalidConfig> {
-    let config = Config::default().baudrate(board::BAUD.bps());
+    let config = Config::default().baudrate(wiring::BAUD.bps());
     let (tx, mut rx) = Serial::new(usart, (pins.tx, pins.rx), config, rcc)?.split();
     let (producer, consumer) = bytes.split();
     rx.listen();

@@ -1,6 +1,7 @@
 //! The start that both images share: clock, and why there was a reset.
 
-use crate::{board, clock, crash, model, reset};
+use super::{clock, reset, wiring};
+use crate::{crash, model};
 use blindgrasp_shared::device::Device;
 use blindgrasp_shared::identity::{BrownOut, Clock, Crash, Identity, Image, ResetCause};
 use stm32f4xx_hal::pac::{DBGMCU, FLASH, RCC};
@@ -50,13 +51,13 @@ impl Boot {
     pub fn device(&self, image: &'static [u8]) -> Device<JOINTS, FINGERS> {
         let image = Image::decode(image).expect("the build wrote the description");
         let &Self { clock, reset, crash, brown_out, .. } = self;
-        let clock_hz = if self.is_emulated() { 0 } else { board::SYSTEM_CLOCK.raw() };
+        let clock_hz = if self.is_emulated() { 0 } else { wiring::SYSTEM_CLOCK.raw() };
         let told = Identity {
             reset,
             crash,
             brown_out,
             clock_hz,
-            most_baud: board::BAUD,
+            most_baud: wiring::BAUD,
             ..Identity::of(image, clock)
         };
         Device::new(model::params(), told)
