@@ -105,6 +105,7 @@ mod with_probes {
             "stack_bytes": 124 * 1024,
             "flashed": false,
             "verified": false,
+            "brown_out": null,
         });
         assert_eq!(report, expected);
 
@@ -225,6 +226,8 @@ mod with_probes {
         let path = folder.write("image", &Elf::good(&image()).bytes());
         // Which of the two depends on what is connected to this machine.
         assert_refused(&folder, &["flash", &path, "--probe", NO_PROBE], &["no debug probe"]);
+        let arguments = ["flash", &path, "--brown-out", "3", "--probe", NO_PROBE];
+        assert_refused(&folder, &arguments, &["no debug probe"]);
     }
 
     #[test]
