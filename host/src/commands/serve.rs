@@ -5,7 +5,7 @@ use anyhow::{Context, bail};
 use blindgrasp::device::interrupt;
 use blindgrasp::device::line::Line;
 use blindgrasp::device::pty::{Link, Pty};
-use blindgrasp::device::serve::{Served, serve};
+use blindgrasp::device::serve::{News, Served, serve};
 use blindgrasp::device::simulated::{Happening, SimulatedHand};
 use blindgrasp::device::transport::BAUD;
 use blindgrasp::scene::Scene;
@@ -68,12 +68,13 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
     interrupt::listen();
     writeln!(io::stdout().lock(), "port {}", port.display()).context("cannot print the port")?;
     let period_s = scene.control.period_s;
-    let served = serve(&mut hand, &mut Line::new(arguments.baud), &mut pty, |tick, happened| {
-        let words = match happened {
-            Happening::Grasped => "a grasp begins".to_owned(),
-            Happening::Lost(lost) => format!("the object is lost: {lost}; it is put back"),
-            Happening::LetGo => "the object is let go; it is put back".to_owned(),
-            Happening::PutBack => "the object is back".to_owned(),
+    let served = serve(&mut hand, &mut Line::new(arguments.baud), &mut pty, |tick, news| {
+        let words = match news {
+            News::World(Happening::Grasped) => "a grasp begins".to_owned(),
+            News::World(Happening::Lost(lost)) => format!("the object is lost: {lost}; it is put back"),
+            News::World(Happening::LetGo) => "the object is let go; it is put back".to_owned(),
+            News::World(Happening::PutBack) => "the object is back".to_owned(),
+            News::Missed(ticks) => format!("this program stood still: {ticks} ticks are missed"),
         };
         eprintln!("{:.3} s: {words}", tick as f64 * period_s);
     })
