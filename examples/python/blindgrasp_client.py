@@ -357,6 +357,7 @@ PACKET = Struct(
         Telemetry=Struct(decimation=U16, signals=BYTE),
         Joints=Struct(counts=List(I32), failed=Option(FAULT), late=BOOL),
         Burst=Struct(index=U16),
+        Goodbye=None,
     ),
 )
 FIELDS = {
@@ -402,7 +403,7 @@ IDENTITY = Struct(
     changed=Unsigned(64),
 )
 REPLY = Enum(
-    Identity=Struct(sequence=U16, session=U16, identity=IDENTITY),
+    Identity=Struct(sequence=U16, session=U16, identity=IDENTITY, ends_another=BOOL),
     Answer=Struct(sequence=U16, refused=Option(REFUSAL)),
     Value=Struct(sequence=U16, parameter=PARAMETER, index=BYTE, setting=Struct(value=F32, file=F32)),
     Record=RECORD,
@@ -599,7 +600,7 @@ class Line:
             os.set_blocking(file, False)
 
     @classmethod
-    def open(cls, port):
+    def open(cls, port, alone=True):
         try:
             if port.startswith("unix:"):
                 connection = socket.socket(socket.AF_UNIX)
@@ -608,16 +609,23 @@ class Line:
             if port.startswith("pipes:"):
                 source, _, sink = port[6:].partition(",")
                 return cls.pipes(source, sink, time.monotonic() + 10)
-            return cls(*[cls.serial(port)] * 2)
+            return cls(*[cls.serial(port, alone)] * 2)
         except OSError as error:
             raise BadInput(f"cannot open {port}: {error.strerror}") from error
 
     @staticmethod
-    def serial(path):
+    def serial(path, alone):
         """8 bits, no parity, a stop bit, 1 Mbaud; a pseudo-terminal has no baud rate, and takes it."""
+        import fcntl
         import termios
 
         port = os.open(path, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
+        try:
+            # One program at a time: blindgrasp itself, pyserial and picocom ask for the same lock.
+            if alone:
+                fcntl.flock(port, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            raise BadInput(f"{path} is in use by another program") from None
         try:
             settings = termios.tcgetattr(port)
             speed = getattr(termios, "B1000000", None)
@@ -689,7 +697,9 @@ class Session:
 
     def send(self, request):
         self.sequence = self.sequence + 1 & 0xFFFF
-        packet = {"session": self.number, "sequence": self.sequence, "request": request}
+        # By chance, so that no other program has the number.
+        number = int.from_bytes(os.urandom(2), "little") if "Hello" in request else self.number
+        packet = {"session": number, "sequence": self.sequence, "request": request}
         self.line.write(encode_frame(PACKET.encode(packet)))
         return self.sequence
 
@@ -714,6 +724,8 @@ class Session:
                 self.collect(body)
             elif kind == "Answer" and body["sequence"] in self.waiting:
                 self.waiting.discard(body["sequence"])
+                if body["refused"] in ("SessionTaken", "NoSession"):
+                    raise Refused("Heartbeat", body["refused"])
             else:
                 heard.append(reply)
         return heard
@@ -791,9 +803,15 @@ class Session:
         theirs = self.identity["image"]["interface_version"]
         if theirs != INTERFACE_VERSION:
             raise Trouble(f"the hand has interface version {theirs}, this client {INTERFACE_VERSION}")
+        if reply["Identity"]["ends_another"]:
+            print("another program was talking to this hand: its session has ended", file=sys.stderr)
         self.next_heartbeat = time.monotonic()
         self.beat()
         return self.identity
+
+    def goodbye(self):
+        """Ends the session and its records; nobody waits for the answer."""
+        self.send("Goodbye")
 
     def command(self, command):
         return self.ask({"Command": command})
@@ -1032,11 +1050,11 @@ def run_grasp(session, args):
             raise Trouble("the release does not end as it should")
         session.command("Disarm")
         session.pump(PATIENCE_S, lambda: state() == "Disarmed")
-    except BaseException:
-        session.command("Stop")
+    except BaseException as error:
+        # What another program leads is not stopped under its hands.
+        if not (isinstance(error, Refused) and error.refusal == "SessionTaken"):
+            session.command("Stop")
         raise
-    finally:
-        session.telemetry(0, 0)
 
 
 def run_burst(session, printer):
@@ -1058,27 +1076,30 @@ def run(args, out):
                 qemu.end()
     printer = Printer(getattr(args, "csv", False), out)
     settings = [parameter(args.key)] if args.command in ("get", "set") else []
-    session = Session(Line.open(args.port), printer)
-    if args.command == "stop":  # of nobody's session, and without a hello
+    # A stop is of nobody's session, without a hello, and goes to a hand that another program leads, too.
+    session = Session(Line.open(args.port, alone=args.command != "stop"), printer)
+    if args.command == "stop":
         session.command("Stop")
         return 0
     identity = session.hello()
-    if args.command == "info":
-        print(json.dumps(identity, indent=2), file=out)
-    elif args.command == "get":
-        print(session.ask({"GetParameter": settings[0]})["Value"]["setting"]["value"], file=out)
-    elif args.command == "set":
-        session.ask({"SetParameter": {**settings[0], "value": args.value}})
-    elif args.command == "clear":
-        session.command("ClearFault")
-    elif args.command == "watch":
-        session.telemetry(args.decimation, args.signals)
-        session.pump(args.seconds)
-        session.telemetry(0, 0)
-    elif args.command == "burst":
-        run_burst(session, printer)
-    elif args.command == "grasp":
-        run_grasp(session, args)
+    try:
+        if args.command == "info":
+            print(json.dumps(identity, indent=2), file=out)
+        elif args.command == "get":
+            print(session.ask({"GetParameter": settings[0]})["Value"]["setting"]["value"], file=out)
+        elif args.command == "set":
+            session.ask({"SetParameter": {**settings[0], "value": args.value}})
+        elif args.command == "clear":
+            session.command("ClearFault")
+        elif args.command == "watch":
+            session.telemetry(args.decimation, args.signals)
+            session.pump(args.seconds)
+        elif args.command == "burst":
+            run_burst(session, printer)
+        elif args.command == "grasp":
+            run_grasp(session, args)
+    finally:
+        session.goodbye()
     print(json.dumps(session.counted()), file=sys.stderr)
     return 0
 

@@ -1,7 +1,7 @@
 //! Between the line and the control task: frames to packets, replies to frames. Runs when nothing else does.
 
 use crate::model::JOINTS;
-use crate::queue::{HandPacket, HandReply, LinkEnd, Outgoing, Telemetry};
+use crate::queue::{HandPacket, HandReply, LinkEnd, Telemetry};
 use blindgrasp_shared::command::Refusal;
 use blindgrasp_shared::link::message::{Packet, Reply, not_understood};
 use blindgrasp_shared::link::{Counters, Receiver, Sender, most_bytes};
@@ -112,20 +112,17 @@ impl<'q, P: Port> Link<'q, P> {
             // There is room, so this can't fail.
             let _ = self.refusals.push_back(refusal);
         }
-        if self.sent == self.length
-            && let Some(next) = self
-                .refusals
-                .pop_front()
-                .map(|(sequence, reason)| Outgoing::Answer(refused(sequence, reason)))
-                .or_else(|| self.queues.take())
-        {
+        if self.sent == self.length {
+            // Who waits for an answer has done his part; a refusal can wait.
             let (sender, buffer) = (&mut self.sender, &mut self.frame);
-            let frame = match next {
-                Outgoing::Answer(reply) => sender.reply(&reply, buffer),
-                Outgoing::Telemetry(Telemetry::Record(record, signals)) => {
-                    sender.record(&record, signals, buffer)
-                }
-                Outgoing::Telemetry(Telemetry::Part(part)) => sender.reply(&Reply::Snapshot(part), buffer),
+            let refusal = || self.refusals.pop_front().map(|(sequence, reason)| refused(sequence, reason));
+            let frame = match self.queues.answer().or_else(refusal) {
+                Some(reply) => sender.reply(&reply, buffer),
+                None => match self.queues.telemetry() {
+                    Some(Telemetry::Record(record, signals)) => sender.record(&record, signals, buffer),
+                    Some(Telemetry::Part(part)) => sender.reply(&Reply::Snapshot(part), buffer),
+                    None => Ok(&[][..]),
+                },
             };
             // The buffer has room for the longest reply, so this can't fail.
             self.length = frame.map_or(0, <[u8]>::len);
@@ -165,15 +162,34 @@ mod tests {
     use blindgrasp_shared::command::Command;
     use blindgrasp_shared::link::encode;
     use blindgrasp_shared::link::message::Request;
+    use blindgrasp_shared::telemetry::List;
+    use blindgrasp_shared::telemetry::snapshot::Part;
+    use proptest::prelude::*;
+    use std::cell::RefCell;
     use std::collections::VecDeque;
     use std::vec::Vec;
 
-    /// What comes, and what was sent; the line takes a byte only at every other try.
+    /// What comes, and what was sent; the line takes a byte only at every so many tries, at every other at best.
     #[derive(Default)]
     struct Wire {
         incoming: VecDeque<u8>,
         sent: Vec<u8>,
-        free: bool,
+        every: usize,
+        tries: usize,
+    }
+
+    impl Port for &RefCell<Wire> {
+        fn receive(&mut self) -> Option<u8> {
+            (&mut *self.borrow_mut()).receive()
+        }
+
+        fn is_silent(&self) -> bool {
+            self.borrow().incoming.is_empty()
+        }
+
+        fn try_send(&mut self, byte: u8) -> bool {
+            (&mut *self.borrow_mut()).try_send(byte)
+        }
     }
 
     impl Port for &mut Wire {
@@ -186,11 +202,12 @@ mod tests {
         }
 
         fn try_send(&mut self, byte: u8) -> bool {
-            self.free = !self.free;
-            if self.free {
+            self.tries += 1;
+            let is_free = self.tries.is_multiple_of(self.every.max(2));
+            if is_free {
                 self.sent.push(byte);
             }
-            self.free
+            is_free
         }
     }
 
@@ -201,6 +218,11 @@ mod tests {
             self.incoming.extend(encode(&packet, &mut buffer).unwrap());
         }
 
+        fn say_nonsense(&mut self, sequence: u16) {
+            let mut buffer = [0; 32];
+            self.incoming.extend(encode(&(1_u16, sequence, 200_u8), &mut buffer).unwrap());
+        }
+
         /// Answers that were sent: their sequence numbers and refusals.
         fn answers(&self) -> Vec<(u16, Option<Refusal>)> {
             let mut receiver = Receiver::<{ HandReply::MOST_BYTES + 4 }>::new();
@@ -209,6 +231,7 @@ mod tests {
                 let Some(payload) = receiver.push(byte) else { continue };
                 match Reply::<{ crate::model::JOINTS }>::decode(payload.unwrap()).unwrap() {
                     Reply::Answer { sequence, refused } => answers.push((sequence, refused)),
+                    Reply::Snapshot(_) => {}
                     other => panic!("{other:?}"),
                 }
             }
@@ -243,6 +266,65 @@ mod tests {
         assert_eq!(wire.answers(), busy);
     }
 
+    proptest! {
+        /// Whatever comes, over a line that is full of it: each request is answered once, and one that was taken is not
+        /// answered with a refusal, nor with nothing.
+        #[test]
+        fn every_request_is_answered_once_over_a_line_that_is_full(
+            every in 1..30_usize,
+            steps in proptest::collection::vec(
+                (proptest::collection::vec(0..4_u8, 0..12), 0..400_usize, 0..6_usize),
+                1..60,
+            ),
+        ) {
+            let wire = RefCell::new(Wire { every, ..Wire::default() });
+            let mut queues = Queues::new();
+            let (mut control, end) = queues.split();
+            let mut link = Link::new(&wire, end);
+            let (mut sequence, mut taken) = (0_u16, Vec::new());
+            let mut tick = || match control.take() {
+                Some(packet) => {
+                    taken.push(packet.sequence);
+                    control.answer(Reply::Answer { sequence: packet.sequence, refused: None });
+                    true
+                }
+                None => {
+                    // What there may be of telemetry takes no answer's place.
+                    control.tell(Telemetry::Part(Part { tick: 0, offset: 0, length: 64, bytes: List::first_of([1; 64], 64) }));
+                    false
+                }
+            };
+            for (requests, polls, ticks) in steps {
+                for kind in requests {
+                    let mut wire = wire.borrow_mut();
+                    match kind {
+                        0 => wire.say(sequence, Request::Command(Command::Stop)),
+                        1 => wire.say_nonsense(sequence),
+                        _ => wire.say(sequence, Request::Heartbeat),
+                    }
+                    sequence += 1;
+                }
+                for _ in 0..polls {
+                    link.poll();
+                }
+                for _ in 0..ticks {
+                    tick();
+                }
+            }
+            while !link.is_idle() || tick() {
+                (0..1000).for_each(|_| link.poll());
+            }
+            let mut answers = wire.borrow().answers();
+            answers.sort_unstable_by_key(|answer| answer.0);
+            prop_assert!(answers.iter().map(|answer| answer.0).eq(0..sequence));
+            let mut done: Vec<u16> =
+                answers.iter().filter(|(_, refused)| refused.is_none()).map(|answer| answer.0).collect();
+            taken.sort_unstable();
+            done.sort_unstable();
+            prop_assert_eq!(done, taken);
+        }
+    }
+
     #[test]
     fn requests_without_room_are_answered_so_and_a_stop_has_room() {
         let mut wire = Wire::default();
@@ -274,11 +356,10 @@ mod tests {
     #[test]
     fn what_is_no_request_is_refused_and_damage_is_counted() {
         let mut wire = Wire::default();
-        let mut buffer = [0; 32];
-        let length = encode(&(1_u16, 77_u16, 200_u8), &mut buffer).unwrap().len();
-        wire.incoming.extend(&buffer[..length]);
-        buffer[2] ^= 1;
-        wire.incoming.extend(&buffer[..length]);
+        wire.say_nonsense(77);
+        let mut damaged = wire.incoming.clone();
+        damaged[2] ^= 1;
+        wire.incoming.extend(damaged);
         wire.say(78, Request::Heartbeat);
         let mut queues = Queues::new();
         let (mut control, end) = queues.split();

@@ -1,10 +1,12 @@
 //! The queues between the control task and the link: bounded, without locks, and what does not fit is counted.
 //!
 //! The control task is an end of both. It never waits: an empty inbox is no packet in this tick, a full outbox is a
-//! record lost, and the number of those is in the next record.
+//! record lost, and the number of those is in the next record. An answer is never lost: without room for one, no packet is
+//! taken.
 
 use crate::model::JOINTS;
 use blindgrasp_shared::command::Command;
+use blindgrasp_shared::link::may_take;
 use blindgrasp_shared::link::message::{Packet, Reply, Request, Signals};
 use blindgrasp_shared::telemetry::Record;
 use blindgrasp_shared::telemetry::snapshot::Part;
@@ -21,14 +23,6 @@ pub enum Telemetry {
     Record(Record<JOINTS>, Signals),
     /// A part of a snapshot.
     Part(Part),
-}
-
-/// What the link sends next.
-pub enum Outgoing {
-    /// An answer to a request.
-    Answer(HandReply),
-    /// Telemetry.
-    Telemetry(Telemetry),
 }
 
 /// Packets that wait for a tick; the control task takes one a millisecond. A queue holds one less than its size.
@@ -83,12 +77,14 @@ pub struct ControlEnd<'q> {
 }
 
 impl ControlEnd<'_> {
-    /// The packet for this tick. A stop overtakes whatever waits.
+    /// The packet for this tick, for whose answer there is room. A stop overtakes whatever waits.
     pub fn take(&mut self) -> Option<HandPacket> {
-        dequeue(&mut self.stops).or_else(|| dequeue(&mut self.packets))
+        let room = self.answers.capacity().saturating_sub(self.answers.len());
+        let stop = may_take(true, room).then(|| dequeue(&mut self.stops)).flatten();
+        stop.or_else(|| may_take(false, room).then(|| dequeue(&mut self.packets)).flatten())
     }
 
-    /// Leaves an answer for the line, or drops and counts it.
+    /// Leaves the answer to the packet that was taken for the line. There is room for it.
     pub fn answer(&mut self, reply: HandReply) {
         let lost = enqueue(&mut self.answers, reply).is_err();
         self.dropped = self.dropped.saturating_add(u32::from(lost));
@@ -100,7 +96,7 @@ impl ControlEnd<'_> {
         self.dropped = self.dropped.saturating_add(u32::from(lost));
     }
 
-    /// How many answers, records and parts were dropped so far.
+    /// How many records and parts were dropped so far.
     pub fn dropped(&self) -> u32 {
         self.dropped
     }
@@ -127,10 +123,14 @@ impl LinkEnd<'_> {
         }
     }
 
-    /// What to send next: answers before telemetry.
-    pub fn take(&mut self) -> Option<Outgoing> {
-        let answer = dequeue(&mut self.answers).map(Outgoing::Answer);
-        answer.or_else(|| dequeue(&mut self.records).map(Outgoing::Telemetry))
+    /// The next answer to send. Answers go before all else.
+    pub fn answer(&mut self) -> Option<HandReply> {
+        dequeue(&mut self.answers)
+    }
+
+    /// The next telemetry to send.
+    pub fn telemetry(&mut self) -> Option<Telemetry> {
+        dequeue(&mut self.records)
     }
 
     /// Whether nothing waits to be sent.
@@ -164,6 +164,7 @@ mod tests {
     use blindgrasp_shared::device::{Device, Inputs, Reading};
     use blindgrasp_shared::identity::{Clock, Identity, Image};
     use blindgrasp_shared::telemetry::burst::Burst;
+    use proptest::prelude::*;
     use std::boxed::Box;
 
     fn packet(sequence: u16, request: Request<JOINTS>) -> HandPacket {
@@ -215,13 +216,42 @@ mod tests {
         }
         assert_eq!(control.dropped(), 3);
         for expected in 0..ANSWERS as u16 - 1 {
-            assert!(
-                matches!(link.take(), Some(Outgoing::Answer(Reply::Answer { sequence, .. })) if sequence == expected)
-            );
+            assert!(matches!(link.answer(), Some(Reply::Answer { sequence, .. }) if sequence == expected));
         }
         for _ in 0..RECORDS - 1 {
-            assert!(!link.is_empty() && matches!(link.take(), Some(Outgoing::Telemetry(_))));
+            assert!(!link.is_empty() && link.telemetry().is_some());
         }
         assert!(link.is_empty());
+    }
+
+    proptest! {
+        /// Whatever comes, and however slowly answers leave: there is room for the answer to what is taken, and a stop waits
+        /// only behind a stop, with nothing between them.
+        #[test]
+        fn what_is_taken_has_room_for_its_answer_and_a_stop_waits_behind_a_stop_alone(
+            steps in proptest::collection::vec(0..4_u8, 1..300),
+        ) {
+            let mut queues = Queues::new();
+            let (mut control, mut link) = queues.split();
+            let (mut stops_wait, mut last_was_stop) = (0, false);
+            for step in steps {
+                match step {
+                    0 => stops_wait += i32::from(link.put(packet(0, Request::Command(Command::Stop))).is_ok()),
+                    1 => drop(link.put(packet(0, Request::Heartbeat))),
+                    2 => drop(link.answer()),
+                    _ => {
+                        let taken = control.take();
+                        let is_stop = taken.as_ref().is_some_and(|packet| packet.request != Request::Heartbeat);
+                        prop_assert!(is_stop || stops_wait == 0 || (taken.is_none() && last_was_stop));
+                        if taken.is_some() {
+                            stops_wait -= i32::from(is_stop);
+                            last_was_stop = is_stop;
+                            control.answer(Reply::Answer { sequence: 0, refused: None });
+                        }
+                        prop_assert_eq!(control.dropped(), 0);
+                    }
+                }
+            }
+        }
     }
 }

@@ -111,5 +111,6 @@ pub(crate) fn in_words(packet: Option<&Packet>) -> String {
         Request::Telemetry { .. } => "`telemetry`".to_owned(),
         Request::Burst { index } => format!("record {index} of the burst"),
         Request::Joints(_) => "the joints of a tick".to_owned(),
+        Request::Goodbye => "goodbye".to_owned(),
     }
 }

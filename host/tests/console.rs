@@ -347,6 +347,36 @@ fn a_board_that_was_reset_is_greeted_again() {
 }
 
 #[test]
+fn a_session_that_another_program_takes_ends_the_talk_and_is_told_to_both() {
+    let mut bench = Bench::open();
+    bench.command(Command::Arm);
+    bench.run(200).unwrap();
+    // At the same line, as programs are that know of no lock.
+    let mut other = Talk::new(PATIENCE, bench.now);
+    let mut heard = Vec::new();
+    let mut both = |milliseconds: u32, bench: &mut Bench| {
+        let mut now = bench.now;
+        bench.run_with(milliseconds, |board, bytes| {
+            other.turn(now).expect("it leads the hand");
+            board.take(bytes);
+            board.take(&other.outgoing());
+            let said = board.tick();
+            other.take(&said, now).expect("it leads the hand");
+            heard.extend(std::iter::from_fn(|| other.event()));
+            now += Duration::from_millis(1);
+            said
+        })
+    };
+    assert_eq!(both(300, &mut bench), Err(TalkError::SessionTaken));
+    assert!(!bench.has_seen(&Event::StartedAnew));
+    // It does not take it back.
+    bench.talk = Talk::new(PATIENCE, bench.now + Duration::from_secs(3600));
+    both(1000, &mut bench).unwrap_or_else(|error| panic!("{error}"));
+    assert!(heard.iter().any(|event| matches!(event, Event::Open { ends_another: true, .. })));
+    assert_eq!(bench.board.mode, Mode::Armed);
+}
+
+#[test]
 fn damaged_frames_are_counted_and_silence_is_noticed() {
     let mut bench = Bench::open();
     bench

@@ -15,7 +15,7 @@ use serde_json::Value;
 use std::fs;
 use std::io::{BufRead as _, BufReader, Read as _, Write as _};
 use std::path::{Path, PathBuf};
-use std::process::{Child, Command, Stdio};
+use std::process::{Child, ChildStdin, Command, Stdio};
 use std::thread;
 use std::time::{Duration, Instant};
 use tempfile::TempDir;
@@ -78,6 +78,85 @@ impl Drop for Process {
         let _ = self.0.kill();
         let _ = self.0.wait();
     }
+}
+
+/// A console at a link, whose hand grasps, and the way to type more.
+fn grasping(link: &Path) -> (Process, ChildStdin) {
+    let mut command = blindgrasp(&["console", "--port", link.to_str().expect("UTF-8")]);
+    command.stdin(Stdio::piped());
+    let mut console = Process::start(command);
+    let mut stdin = console.0.stdin.take().expect("stdin");
+    writeln!(stdin, "arm").expect("the line is taken");
+    thread::sleep(Duration::from_millis(500));
+    writeln!(stdin, "grasp").expect("the line is taken");
+    thread::sleep(Duration::from_secs(1));
+    (console, stdin)
+}
+
+/// The hand is still held as it was, when the console ends; its last words and those of the hand.
+fn assert_still_grasping((mut console, mut stdin): (Process, ChildStdin), hand: &mut Process) -> String {
+    writeln!(stdin, "status").expect("the line is taken");
+    drop(stdin);
+    let (code, said, errors) = console.end(PATIENCE);
+    assert_eq!(code, Some(0), "{said}\n{errors}");
+    let modes: Vec<&str> = said.lines().filter(|line| line.starts_with("mode")).collect();
+    let expected = ["mode: disarmed", "mode: armed", "mode: grasping", "mode       grasping"];
+    // Whether the record after the stop still comes is chance.
+    assert!(modes.starts_with(&expected) && said.contains("stop: done\n"), "{said}\n{errors}");
+    hand.signal(Signal::SIGINT);
+    let (code, _, told) = hand.end(PATIENCE);
+    assert_eq!((code, told.matches("a grasp begins").count()), (Some(0), 1), "{told}");
+    told
+}
+
+#[test]
+fn a_port_in_use_is_refused_and_the_grasp_goes_on() {
+    let folder = TempDir::new().expect("a folder");
+    let (link, out) = (folder.path().join("hand"), folder.path().join("a.mcap"));
+    let mut hand = serve(&link, &[]);
+    let console = grasping(&link);
+    let mut record = Process::start(recorded(&out, &[&link], &["--duration", "1"]));
+    let (code, said, errors) = record.end(PATIENCE);
+    assert_eq!((code, said.as_str()), (Some(2), ""), "{errors}");
+    let who = format!("it is in use by `blindgrasp`, process {}: ", console.0.0.id());
+    assert!(errors.contains(&who) && !out.exists(), "{errors}");
+    assert_still_grasping(console, &mut hand);
+    // The port of a program that was killed is free.
+    let mut hand = serve(&link, &[]);
+    let (mut console, _stdin) = grasping(&link);
+    console.signal(Signal::SIGKILL);
+    console.end(PATIENCE);
+    let mut record = Process::start(recorded(&out, &[&link], &["--duration", "1"]));
+    assert_eq!(record.end(PATIENCE).0, Some(0));
+    hand.signal(Signal::SIGINT);
+    hand.end(PATIENCE);
+}
+
+#[test]
+fn a_served_hand_that_stood_still_keeps_its_grasp_and_says_what_it_missed() {
+    let folder = TempDir::new().expect("a folder");
+    let link = folder.path().join("hand");
+    let mut hand = serve(&link, &[]);
+    let console = grasping(&link);
+    for _ in 0..3 {
+        hand.signal(Signal::SIGSTOP);
+        thread::sleep(Duration::from_millis(500));
+        hand.signal(Signal::SIGCONT);
+        thread::sleep(Duration::from_millis(500));
+    }
+    let told = assert_still_grasping(console, &mut hand);
+    let stops = told.lines().filter_map(|line| line.split_once("this program stood still: "));
+    let missed: Vec<u64> = stops
+        .filter_map(|(_, words)| words.strip_suffix(" ticks are missed")?.parse().ok())
+        .filter(|&missed| missed > 300)
+        .collect();
+    assert_eq!(missed.len(), 3, "{told}");
+    let summary = told.lines().last().expect("a summary");
+    let all: u64 = (summary.split_once(" late, "))
+        .and_then(|(_, words)| words.split_once(" missed"))
+        .and_then(|(count, _)| count.parse().ok())
+        .expect("a count");
+    assert!(all >= missed.iter().sum(), "{told}");
 }
 
 /// A hand that is served at a link.
@@ -434,6 +513,11 @@ fn misuse_is_told() {
     let _listener = std::os::unix::net::UnixListener::bind(&silent).expect("a socket");
     let port = format!("unix:{}", silent.display());
     refused(&["record", "--out", path, "--port", &port], &["nothing answers within 3 s"]);
+    // No longer patience than the recording was to be long.
+    refused(
+        &["record", "--out", path, "--port", &port, "--duration", "0.3"],
+        &["nothing answers within 0.3"],
+    );
     assert!(!out.exists(), "a file without anything in it");
 
     // A file is not overwritten.

@@ -110,6 +110,7 @@ refusals! {
     BurstNotOver       = "the records after the fault are still being taken: ask again in a moment";
     LawNotChosen       = "the law of this gain is not chosen: set its parameter `laws.` to 1, disarmed";
     BeyondFile         = "this is looser than the hand's file, and the line can only tighten: `get` shows what the file says";
+    SessionTaken       = "another program has said hello to this hand since, which ended this session: only one may lead it";
 }
 
 impl fmt::Display for Refusal {

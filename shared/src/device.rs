@@ -83,7 +83,7 @@ impl<const J: usize, const F: usize> Device<J, F> {
             params,
             state: State::new(),
             identity,
-            session: Session { number: 0, sequence: 0, understood: false },
+            session: Session::NONE,
             telemetry: Telemetry::OFF,
             snapshot: Outgoing::new(),
         }
@@ -101,6 +101,7 @@ impl<const J: usize, const F: usize> Device<J, F> {
 
     /// One tick, with its request. Its record goes into the burst, too.
     pub fn tick(&mut self, inputs: &Inputs<J>, burst: &mut Burst<J>) -> Outputs<J> {
+        self.session.quiet_ticks = self.session.quiet_ticks.saturating_add(1);
         let asked = match &inputs.packet {
             Some(packet) => self.ask(packet, burst),
             None => Asked::Nothing,
@@ -168,14 +169,11 @@ impl<const J: usize, const F: usize> Device<J, F> {
         let answer = |refused| Asked::Answered(Reply::Answer { sequence, refused });
         match packet.request {
             Request::Hello { interface_version } => {
-                self.session = Session {
-                    number: self.session.number.wrapping_add(1),
-                    sequence,
-                    understood: interface_version == INTERFACE_VERSION,
-                };
+                let ends_another = self.session.is_in_use();
+                self.session.begin(packet.session, sequence, interface_version == INTERFACE_VERSION);
                 let identity = Identity { changed: self.params.changed(), ..self.identity };
                 let session = self.session.number;
-                return Asked::Answered(Reply::Identity { sequence, session, identity });
+                return Asked::Answered(Reply::Identity { sequence, session, identity, ends_another });
             }
             Request::Command(Command::Stop) => {
                 return Asked::Command { sequence, command: Command::Stop };
@@ -215,6 +213,12 @@ impl<const J: usize, const F: usize> Device<J, F> {
                 }
             },
             Request::Joints(_) => answer(Some(Refusal::JointsAreReal)),
+            Request::Goodbye => {
+                self.session.is_open = false;
+                self.telemetry.begin(0, Signals::NONE);
+                self.snapshot.stop();
+                answer(None)
+            }
             // Taken above.
             Request::Hello { .. } => answer(None),
         }
@@ -229,21 +233,56 @@ enum Asked<const J: usize> {
     Command { sequence: u16, command: Command },
 }
 
+/// Ticks without a request after which nobody is thought to use a session.
+const IN_USE_TICKS: u32 = 250;
+
 /// With whom the device speaks.
 #[derive(Clone, Copy, Debug)]
 struct Session {
-    /// 0: nobody has said hello.
+    /// 0: nobody has said hello yet. No session has this number.
     number: u16,
+    /// Nobody has said goodbye.
+    is_open: bool,
+    /// Number of the session before, which this one has ended.
+    before: u16,
     /// Number of the last request that was taken.
     sequence: u16,
     /// Whether the host has the same interface version.
     understood: bool,
+    /// Ticks since the last request that was taken.
+    quiet_ticks: u32,
 }
 
 impl Session {
+    const NONE: Self =
+        Self { number: 0, is_open: false, before: 0, sequence: 0, understood: false, quiet_ticks: 0 };
+
+    /// Begins another session, with the number that is wished for. If none is (0), it is the next; a number that could be
+    /// taken for one of the last two is counted on from.
+    ///
+    /// A device knows nothing by chance, and counts from 1 after each reset. A host wishes for a number by chance, so that
+    /// one that has not noticed the reset is not taken for the owner of the first session after it.
+    fn begin(&mut self, wished: u16, sequence: u16, understood: bool) {
+        let before = self.number;
+        let mut number = if wished == 0 { before.wrapping_add(1) } else { wished };
+        // Three times at most.
+        while [0, before, self.before].contains(&number) {
+            number = number.wrapping_add(1);
+        }
+        *self = Self { number, is_open: true, before, sequence, understood, quiet_ticks: 0 };
+    }
+
+    /// Whether somebody has asked for something a moment ago, and has not said goodbye.
+    fn is_in_use(&self) -> bool {
+        self.is_open && self.quiet_ticks < IN_USE_TICKS
+    }
+
     /// Why a request of this session and number is not taken; otherwise it is now the last.
     fn refuse(&mut self, session: u16, sequence: u16) -> Option<Refusal> {
-        if self.number == 0 || session != self.number {
+        if session != 0 && session == self.before && self.is_open {
+            return Some(Refusal::SessionTaken);
+        }
+        if !self.is_open || session != self.number {
             return Some(Refusal::NoSession);
         }
         if !self.understood {
@@ -255,6 +294,7 @@ impl Session {
             return Some(Refusal::OutOfOrder);
         }
         self.sequence = sequence;
+        self.quiet_ticks = 0;
         None
     }
 }

@@ -420,7 +420,7 @@ signals! {
     excess_j: f32                   = one!("excess_j", "J", "Work of the motors in the last second (fading) beyond the drop of the laws' potentials");
     cycles: u32                     = one!("cycles", "cycles", "Processor cycles of the tick before, with reading and writing the joints; 0 where nothing counts them");
     late_ticks: u32                 = one!("late_ticks", "", "Ticks that were late since the start");
-    dropped: u32                    = one!("dropped", "", "Records and answers that the device lost since its start because a queue was full");
+    dropped: u32                    = one!("dropped", "", "Records and parts of snapshots that the device lost since its start because a queue was full");
     decimation: u16                 = one!("decimation", "ticks", "Ticks from one sent record to the next; 1 where none are sent");
     counts: List<i32, J>            = one!("count", "counts", "Encoder count; missing where angles came from elsewhere, or not at all");
     torques_nm: List<f32, J>        = one!("torque_nm", "N m", "Torque of the next tick");
@@ -550,7 +550,7 @@ mod tests {
         for refusal in Refusal::ALL {
             refusals.push(postcard::to_slice(refusal, &mut buffer).unwrap().to_vec());
         }
-        assert_eq!(bytes(refusals), "000102030405060708090a0b0c0d0e0f1011121314151617");
+        assert_eq!(bytes(refusals), "000102030405060708090a0b0c0d0e0f101112131415161718");
         let mut faults = Vec::new();
         for fault in Fault::ALL {
             faults.push(postcard::to_slice(fault, &mut buffer).unwrap().to_vec());

@@ -117,6 +117,7 @@ impl Bench {
 }
 
 const GRASP: Request<12> = Request::Command(Command::Grasp(Grasp::CONFIGURED));
+const HELLO: Request<12> = Request::Hello { interface_version: INTERFACE_VERSION };
 const ARM: Request<12> = Request::Command(Command::Arm);
 
 #[test]
@@ -126,15 +127,73 @@ fn a_session_begins_with_hello_and_everything_else_needs_one() {
     assert_eq!(bench.refused(ARM), Some(Refusal::NoSession));
     let reply = bench.ask(Request::Hello { interface_version: INTERFACE_VERSION });
     let sequence = bench.sequence;
-    assert_eq!(reply, Reply::Identity { sequence, session: 1, identity: identity(Clock::External) });
+    let expected =
+        Reply::Identity { sequence, session: 1, identity: identity(Clock::External), ends_another: false };
+    assert_eq!(reply, expected);
     assert_eq!(bench.refused(Request::Heartbeat), Some(Refusal::NoSession), "still session 0");
     bench.session = 1;
     bench.done(Request::Heartbeat);
     // Another hello ends this session.
-    bench.ask(Request::Hello { interface_version: INTERFACE_VERSION });
-    assert_eq!(bench.refused(Request::Heartbeat), Some(Refusal::NoSession));
+    bench.ask(HELLO);
+    assert_eq!(bench.refused(Request::Heartbeat), Some(Refusal::SessionTaken));
     bench.session = 2;
     bench.done(Request::Heartbeat);
+    // So does goodbye, and the records with it.
+    bench.done(Request::Telemetry { decimation: 1, signals: Signals::ALL });
+    assert!(bench.tick(None).telemetry.is_some());
+    bench.done(Request::Goodbye);
+    assert_eq!(bench.tick(None).telemetry, None);
+    assert_eq!(bench.refused(Request::Heartbeat), Some(Refusal::NoSession));
+}
+
+#[test]
+fn no_hello_is_given_session_0_nor_one_of_the_last_two() {
+    let mut bench = Bench::silent(Clock::External);
+    let mut before = [0, 0];
+    for k in 0..65_600_u32 {
+        // Nobody's wish for most, and every wish that there is, among them those that can't be had.
+        bench.session = match k {
+            0..65_550 => 0,
+            _ => [0, before[0], before[1], u16::MAX, k as u16][k as usize % 5],
+        };
+        let Reply::Identity { session, .. } = bench.ask(HELLO) else { panic!("no identity") };
+        assert!(session != 0 && !before.contains(&session), "hello {k}: {session} after {before:?}");
+        before = [session, before[0]];
+    }
+    bench.session = before[0];
+    bench.done(Request::Heartbeat);
+}
+
+#[test]
+fn a_session_that_another_program_takes_is_told_to_both_and_told_apart_from_a_reset() {
+    let begin = |bench: &mut Bench, wished| {
+        bench.session = wished;
+        let Reply::Identity { session, ends_another, .. } = bench.ask(HELLO) else { panic!("no identity") };
+        (session, ends_another)
+    };
+    let heartbeat_of = |bench: &mut Bench, session| {
+        bench.session = session;
+        bench.refused(Request::Heartbeat)
+    };
+    let mut bench = Bench::silent(Clock::External);
+    assert_eq!(begin(&mut bench, 500), (500, false));
+    assert_eq!(heartbeat_of(&mut bench, 500), None);
+    assert_eq!(begin(&mut bench, 900), (900, true));
+    assert_eq!(heartbeat_of(&mut bench, 500), Some(Refusal::SessionTaken));
+    assert_eq!(heartbeat_of(&mut bench, 900), None);
+    // A hand that was reset knows of neither, also when it knows of somebody else.
+    let mut bench = Bench::silent(Clock::External);
+    assert_eq!(heartbeat_of(&mut bench, 900), Some(Refusal::NoSession));
+    assert_eq!(begin(&mut bench, 77), (77, false));
+    assert_eq!(heartbeat_of(&mut bench, 900), Some(Refusal::NoSession));
+    // Nobody is told of a program that has ended, with or without a goodbye.
+    bench.session = 77;
+    bench.done(Request::Goodbye);
+    assert_eq!(begin(&mut bench, 78), (78, false));
+    for _ in 0..250 {
+        bench.tick(None);
+    }
+    assert_eq!(begin(&mut bench, 79), (79, false));
 }
 
 #[test]
@@ -423,7 +482,8 @@ fn the_longest_messages_fit() {
     assert!(postcard_bytes(&packet, &mut buffer).len() <= Packet::<1>::MOST_BYTES);
     let mut identity = identity(Clock::Fallback);
     identity.image.hand = "a-hand-with-a-name-of-sixty-four-bytes-which-is-what-is-allowed!";
-    let reply: Reply<'_, 1> = Reply::Identity { sequence: u16::MAX, session: u16::MAX, identity };
+    let reply: Reply<'_, 1> =
+        Reply::Identity { sequence: u16::MAX, session: u16::MAX, identity, ends_another: true };
     let length = postcard_bytes(&reply, &mut buffer).len();
     assert!(length <= Reply::<1>::MOST_BYTES, "{length} {}", Reply::<1>::MOST_BYTES);
     const { assert!(Record::<24>::MOST_BYTES < Reply::<24>::MOST_BYTES) };

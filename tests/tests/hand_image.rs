@@ -155,7 +155,7 @@ fn what_it_does_not_take_it_refuses_by_name() {
             assert_eq!(host.ask_as_is(&packet, sequence).refused(), Some(Refusal::OutOfOrder), "{packet:?}");
         }
         let old = Packet { session: 1, sequence: 200, request };
-        assert_eq!(host.ask_as_is(&old, 200).refused(), Some(Refusal::NoSession));
+        assert_eq!(host.ask_as_is(&old, 200).refused(), Some(Refusal::SessionTaken));
         assert_eq!(host.ask(Request::Heartbeat).refused(), None);
     }
     assert_eq!(host.ask_as_is(&stop(77, 0), 0).refused(), None);
@@ -188,7 +188,7 @@ fn what_it_does_not_take_it_refuses_by_name() {
     assert_eq!(heard.refused(), Some(Refusal::OutOfRange));
     for sequence in [3_u16, 300, 65_535] {
         for heard in [
-            host.ask_as_is(&(2_u16, sequence, 8_u8), sequence),
+            host.ask_as_is(&(2_u16, sequence, 0x7f_u8), sequence),
             host.ask_as_is(&(2_u16, sequence, 1_u8, 6_u8), sequence),
             host.ask_as_is(&(2_u16, sequence, 4_u8, 200_u8, 0_u8), sequence),
             host.ask_as_is(&(2_u16, sequence, 6_u8, 13_u8, [1_u8; 13], 0_u8, 0_u8), sequence),

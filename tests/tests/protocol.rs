@@ -139,6 +139,7 @@ fn packets() -> Vec<(&'static str, Packet<J>)> {
             }),
         ),
         ("a record of the burst", Request::Burst { index: 191 }),
+        ("goodbye", Request::Goodbye),
     ];
     let packet =
         |k: usize, (name, request)| (name, Packet { session: 1, sequence: 0x1234 + k as u16, request });
@@ -156,6 +157,7 @@ fn number(request: &Request<J>) -> usize {
         Request::Telemetry { .. } => 5,
         Request::Joints(_) => 6,
         Request::Burst { .. } => 7,
+        Request::Goodbye => 8,
     }
 }
 
@@ -260,8 +262,14 @@ fn replies() -> Vec<(&'static str, Reply<'static, J>)> {
     (0..).zip(&mut bytes).for_each(|(k, byte)| *byte = 3 * k);
     let part = Part { tick: 5000, offset: 896, length: 903, bytes: List::first_of(bytes, 7) };
     vec![
-        ("identity", Reply::Identity { sequence: 0x1234, session: 1, identity: IDENTITY }),
-        ("identity after a crash", Reply::Identity { sequence: 7, session: 2, identity: after_a_crash }),
+        (
+            "identity",
+            Reply::Identity { sequence: 0x1234, session: 1, identity: IDENTITY, ends_another: false },
+        ),
+        (
+            "identity after a crash",
+            Reply::Identity { sequence: 7, session: 2, identity: after_a_crash, ends_another: true },
+        ),
         ("done", answer(None)),
         ("refused", answer(Some(Refusal::InFault))),
         (
@@ -622,7 +630,7 @@ fn streams() -> Vec<serde_json::Value> {
 fn every_message_is_among_the_vectors() {
     let mut requests: Vec<usize> = packets().iter().map(|(_, packet)| number(&packet.request)).collect();
     requests.dedup();
-    assert_eq!(requests, (0..8).collect::<Vec<_>>());
+    assert_eq!(requests, (0..9).collect::<Vec<_>>());
     let mut numbers: Vec<u8> = replies().iter().map(|(_, reply)| payload(&frame(reply))[0]).collect();
     numbers.dedup();
     assert_eq!(numbers, (0..dense::TAG).collect::<Vec<_>>());

@@ -2,8 +2,8 @@
 
 use super::{Outcome, ports};
 use anyhow::{Context, anyhow, bail};
-use blindgrasp::device::recorder::{Recorder, Recording};
-use blindgrasp::device::talk::{self, Event, SELDOM, Talk, telemetry};
+use blindgrasp::device::recorder::{ENDED_ANOTHER, Recorder, Recording};
+use blindgrasp::device::talk::{self, Event, SELDOM, Talk, TalkError, telemetry};
 use blindgrasp::device::transport::{Transport, TransportError};
 use blindgrasp::scene::HandModel;
 use blindgrasp::wire::{Answer, Firmware, Record, Request};
@@ -107,12 +107,15 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
         broken: None,
     };
     let ended = console.run(&mut *line).with_context(|| format!("port {port}"));
-    if ended.is_err() {
+    let now = Instant::now();
+    match &ended {
+        Ok(()) => console.talk.say_goodbye(now),
+        // What another program leads is not stopped under its hands.
+        Err(error) if error.downcast_ref() == Some(&TalkError::SessionTaken) => {}
         // Whatever it was: nobody leads the hand any more. If the line is gone, so is the heartbeat.
-        let now = Instant::now();
-        console.talk.ask(Request::Command(Command::Stop), now);
-        let _ = line.send(&console.talk.outgoing(), now + SENDING);
+        Err(_) => console.talk.ask(Request::Command(Command::Stop), now),
     }
+    let _ = line.send(&console.talk.outgoing(), now + SENDING);
     let totals = console.recorder.as_mut().map(|recorder| recorder.finish(Instant::now()));
     if let (Some(recording), Some(path)) = (recording, &arguments.out) {
         let saved = recording.finish()?;
@@ -396,7 +399,13 @@ impl Console {
 
     fn show(&mut self, event: Event, now: Instant) -> anyhow::Result<()> {
         match event {
-            Event::Open { firmware, period_us } => self.greet(&firmware, period_us),
+            Event::Open { firmware, period_us, ends_another } => {
+                self.greet(&firmware, period_us)?;
+                if ends_another {
+                    eprintln!("blindgrasp: warning: {ENDED_ANOTHER}");
+                }
+                Ok(())
+            }
             Event::StartedAnew => {
                 (self.status, self.watch_ticks) = (Status::Shown, None);
                 self.typed.lines.clear();

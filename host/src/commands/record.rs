@@ -3,12 +3,10 @@
 use super::{Outcome, ports};
 use anyhow::{Context, anyhow, bail};
 use blindgrasp::device::interrupt;
-use blindgrasp::device::recorder::{Recorder, Recording, Totals};
+use blindgrasp::device::recorder::{ENDED_ANOTHER, Recorder, Recording, Totals};
 use blindgrasp::device::talk::{self, Event, Talk, TalkError};
 use blindgrasp::device::transport::{Transport, TransportError};
 use blindgrasp::record::mcap::{RecordingError, Saved};
-use blindgrasp::wire::Request;
-use blindgrasp_shared::link::message::Signals;
 use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
@@ -36,7 +34,7 @@ const LOOK_AGAIN: Duration = Duration::from_millis(500);
 /// --duration, ends the recording.
 ///
 /// It only listens: a hand is commanded by `console --out FILE` or `monitor --out FILE`, which record in the same way. The
-/// heartbeat is kept while it records; a hand with torque lets go when it ends.
+/// heartbeat is kept while it records; a hand with torque lets go when it ends. A port that another program has open is refused.
 ///
 /// Exit code 0: no record was lost; 1: some were, which the file tells, or the disk is full; the file is good all the same;
 /// 2: bad usage, or nobody answers.
@@ -124,6 +122,8 @@ struct Ended {
 enum Trouble {
     /// Nobody is there, or nobody that can be talked to.
     Nobody(anyhow::Error),
+    /// Another program leads the hand.
+    Taken(TalkError),
     /// The file takes nothing any more.
     File(RecordingError),
 }
@@ -198,7 +198,8 @@ fn follow(
             Ok(News::Words(k, words)) => bar.suspend(|| eprintln!("blindgrasp: {}: {words}", ports[k])),
             Ok(News::Status(k, status)) => totals[k] = status,
             Ok(News::End(k, end)) => {
-                if end.error.is_some() {
+                // The other hands have not been taken.
+                if !matches!(end.error, None | Some(Trouble::Taken(_))) {
                     ending.store(true, Ordering::Relaxed);
                 }
                 totals[k] = end.totals;
@@ -238,6 +239,7 @@ fn finish(
                 }
                 return Err(error.context(format!("port {}", ports[k])));
             }
+            Some(Trouble::Taken(taken)) => error = Some(format!("port {}: {taken}", ports[k])),
             Some(Trouble::File(stopped)) => error = Some(stopped.to_string()),
             None => {}
         }
@@ -329,6 +331,8 @@ enum Cut {
     End,
     /// Nothing comes over the line.
     Line(anyhow::Error),
+    /// Another program leads the hand.
+    Taken(TalkError),
     File(RecordingError),
 }
 
@@ -340,7 +344,10 @@ impl From<RecordingError> for Cut {
 
 impl From<TalkError> for Cut {
     fn from(error: TalkError) -> Self {
-        Self::Line(ports::explained(error))
+        match error {
+            TalkError::SessionTaken => Self::Taken(error),
+            error => Self::Line(ports::explained(error)),
+        }
     }
 }
 
@@ -375,6 +382,10 @@ impl Attendant<'_> {
             match self.listen(&mut **open, &mut cut_at) {
                 Cut::End => break,
                 Cut::File(error) => return Err(Trouble::File(error)),
+                Cut::Taken(error) => {
+                    let cut = self.recorder.cut("another program leads the hand", Instant::now());
+                    return Err(cut.map_or_else(Trouble::File, |()| Trouble::Taken(error)));
+                }
                 Cut::Line(error) if self.recorder.totals().sessions == 0 => {
                     return Err(Trouble::Nobody(error));
                 }
@@ -400,19 +411,26 @@ impl Attendant<'_> {
 
     /// Until the line is cut.
     fn listen(&mut self, line: &mut dyn Transport, cut_at: &mut Option<Instant>) -> Cut {
-        let mut talk = Talk::new(talk::PATIENCE, Instant::now()).tapped();
+        let begun = Instant::now();
+        let mut talk = Talk::new(talk::PATIENCE, begun).tapped();
         let cut = loop {
             if let Err(cut) = self.turn(&mut talk, line, cut_at) {
                 break cut;
             }
         };
+        let now = Instant::now();
         if let Cut::End = cut {
-            // Nobody listens any more.
-            let now = Instant::now();
-            talk.ask(Request::Telemetry { decimation: 0, signals: Signals::NONE }, now);
+            talk.say_goodbye(now);
             let _ = line.send(&talk.outgoing(), now + SENDING);
         }
-        cut
+        match cut {
+            // The time was up before anybody answered. Where another port's trouble has ended it, nobody can know.
+            Cut::End if self.recorder.totals().sessions == 0 && !self.ending.load(Ordering::Relaxed) => {
+                let waited = Duration::from_millis((now - begun).as_millis() as u64);
+                Cut::from(TalkError::NobodyThere(waited, *talk.traffic()))
+            }
+            cut => cut,
+        }
     }
 
     /// What there is to do, and to wait for, at one time.
@@ -447,13 +465,19 @@ impl Attendant<'_> {
     /// Tells the user what matters to him.
     fn hear(&mut self, event: &Event, cut_at: &mut Option<Instant>, now: Instant) {
         match event {
-            Event::Open { firmware, .. } => match cut_at.take() {
-                Some(since) => {
-                    self.gaps += now - since;
-                    self.say(format!("back after {:.1} s: {}", (now - since).as_secs_f64(), firmware.words));
+            Event::Open { firmware, ends_another, .. } => {
+                match cut_at.take() {
+                    Some(since) => {
+                        self.gaps += now - since;
+                        let since_s = (now - since).as_secs_f64();
+                        self.say(format!("back after {since_s:.1} s: {}", firmware.words));
+                    }
+                    None => self.say(firmware.words.clone()),
                 }
-                None => self.say(firmware.words.clone()),
-            },
+                if *ends_another {
+                    self.say(ENDED_ANOTHER.to_owned());
+                }
+            }
             Event::StartedAnew => {
                 *cut_at = Some(now);
                 self.say("the device was reset".to_owned());

@@ -243,7 +243,7 @@ impl<T: Transport> Client<T> {
                     }
                     _ => return Ok(Turned { answer, record }),
                 },
-                Ok(Reply::Identity { sequence, session, identity }) => {
+                Ok(Reply::Identity { sequence, session, identity, .. }) => {
                     let firmware = Firmware::from(&identity);
                     if identity.image.interface_version != INTERFACE_VERSION {
                         let theirs = identity.image.interface_version;

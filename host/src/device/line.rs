@@ -7,7 +7,7 @@ use crate::wire::{Packet, Record};
 use blindgrasp_shared::command::{Command, Refusal};
 use blindgrasp_shared::device::Outputs;
 use blindgrasp_shared::link::message::{self, Request, Signals, not_understood};
-use blindgrasp_shared::link::{Receiver, Sender, most_bytes};
+use blindgrasp_shared::link::{Receiver, Sender, may_take, most_bytes};
 use blindgrasp_shared::telemetry::snapshot::Part;
 use std::collections::VecDeque;
 use std::time::Duration;
@@ -97,20 +97,17 @@ impl Line {
         }
     }
 
-    /// The request for this tick. A stop overtakes whatever waits.
+    /// The request for this tick, for whose answer there is room. A stop overtakes whatever waits.
     pub fn packet(&mut self) -> Option<Packet> {
-        self.stops.pop_front().or_else(|| self.packets.pop_front())
+        let room = ANSWERS.saturating_sub(self.answers.len());
+        let stop = may_take(true, room).then(|| self.stops.pop_front()).flatten();
+        stop.or_else(|| may_take(false, room).then(|| self.packets.pop_front()).flatten())
     }
 
-    /// Leaves what a tick gave for the line, or drops and counts it.
+    /// Leaves what a tick gave for the line: the answer, for which there is room, and telemetry, if there is. What is dropped
+    /// is counted.
     pub fn post(&mut self, outputs: Outputs<MAX_JOINTS>) {
-        if let Some(reply) = outputs.reply {
-            if self.answers.len() < ANSWERS {
-                self.answers.push_back(reply);
-            } else {
-                self.dropped = self.dropped.saturating_add(1);
-            }
-        }
+        self.answers.extend(outputs.reply);
         let record = outputs.telemetry.map(|signals| Telemetry::Record(Box::new(outputs.record), signals));
         for telemetry in record.into_iter().chain(outputs.part.map(Telemetry::Part)) {
             if self.records.len() < RECORDS {
@@ -143,11 +140,11 @@ impl Line {
         }
     }
 
-    /// Makes the next frame, if there is something to send: refusals, then answers, then telemetry.
+    /// Makes the next frame, if there is something to send: answers, then refusals, then telemetry.
     fn load(&mut self) -> bool {
         let mut buffer = [0; most_bytes(Reply::MOST_BYTES)];
         let sender = &mut self.sender;
-        let frame = match self.refusals.pop_front().or_else(|| self.answers.pop_front()) {
+        let frame = match self.answers.pop_front().or_else(|| self.refusals.pop_front()) {
             Some(reply) => sender.reply(&reply, &mut buffer),
             None => match self.records.pop_front() {
                 Some(Telemetry::Record(record, signals)) => sender.record(&record, signals, &mut buffer),
@@ -160,5 +157,63 @@ impl Line {
         self.frame.extend_from_slice(frame.unwrap_or_default());
         self.sent = 0;
         true
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use blindgrasp_shared::link::encode;
+    use proptest::prelude::*;
+
+    fn frame(sequence: u16, request: Request<MAX_JOINTS>) -> Vec<u8> {
+        let mut buffer = [0; most_bytes(Packet::MOST_BYTES)];
+        encode(&Packet { session: 1, sequence, request }, &mut buffer).expect("room").to_vec()
+    }
+
+    proptest! {
+        /// As in the firmware (`firmware/src/link.rs`): each request is answered once, and one that was taken is done.
+        #[test]
+        fn every_request_is_answered_once_over_a_line_that_is_full(
+            baud in 9600..200_000_u32,
+            steps in proptest::collection::vec(proptest::collection::vec(any::<bool>(), 0..12), 1..60),
+        ) {
+            let (mut line, mut sent) = (Line::new(baud), Vec::new());
+            let (mut sequence, mut taken) = (0_u16, Vec::new());
+            let mut incoming = VecDeque::new();
+            for requests in steps.into_iter().chain(std::iter::repeat_n(Vec::new(), 20_000)) {
+                for is_stop in requests {
+                    let request = if is_stop { Request::Command(Command::Stop) } else { Request::Heartbeat };
+                    incoming.extend(frame(sequence, request));
+                    sequence += 1;
+                }
+                while line.listens() && let Some(byte) = incoming.pop_front() {
+                    line.take(&[byte]);
+                }
+                if let Some(packet) = line.packet() {
+                    taken.push(packet.sequence);
+                    line.answers.push_back(Reply::Answer { sequence: packet.sequence, refused: None });
+                    prop_assert!(line.answers.len() <= ANSWERS);
+                }
+                line.send(Duration::from_millis(1), &mut sent);
+            }
+            prop_assert!(incoming.is_empty());
+            let mut receiver = Receiver::<256>::new();
+            let (mut answered, mut done) = (Vec::new(), Vec::new());
+            for &byte in &sent {
+                let Some(payload) = receiver.push(byte) else { continue };
+                let reply = message::Reply::<MAX_JOINTS>::decode(payload.expect("no damage")).expect("a reply");
+                let message::Reply::Answer { sequence, refused } = reply else { panic!("{reply:?}") };
+                answered.push(sequence);
+                if refused.is_none() {
+                    done.push(sequence);
+                }
+            }
+            for numbers in [&mut answered, &mut done, &mut taken] {
+                numbers.sort_unstable();
+            }
+            prop_assert!(answered.into_iter().eq(0..sequence));
+            prop_assert_eq!(done, taken);
+        }
     }
 }

@@ -28,6 +28,9 @@ const BURST: Duration = Duration::from_millis(20);
 const SETTLED: Duration = Duration::from_millis(50);
 /// How often something is asked that was not answered.
 const TRIES: u8 = 3;
+/// Said of a session that was not the only one.
+pub const ENDED_ANOTHER: &str =
+    "another program was talking to this hand: its session has ended with this one";
 /// Payloads that were sent before a session, and are kept for it.
 const KEPT: usize = 8;
 
@@ -273,7 +276,14 @@ impl Recorder {
                 writer.damaged(device, 1);
                 Ok(())
             })?,
-            Event::Open { firmware, .. } => self.open(firmware, talk, now)?,
+            Event::Open { firmware, ends_another, .. } => {
+                self.open(firmware, talk, now)?;
+                if *ends_another {
+                    self.write(now, |writer, device, at| {
+                        writer.event(device, at, Level::Warning, ENDED_ANOTHER)
+                    })?;
+                }
+            }
             Event::StartedAnew => self.cut("the device was reset", now)?,
             Event::Aside(request, answer) => self.answered(request, answer.as_ref(), talk, now)?,
             Event::Answer(Request::SetParameter { parameter, index, value }, Answer::Done) => {

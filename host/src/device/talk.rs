@@ -4,7 +4,8 @@
 //! [`Talk`] knows neither lines nor clocks: it is given bytes and the time, and gives bytes and events. It says hello until
 //! it is heard, and then keeps the heartbeat going; a hand with torque lets go without it. What is asked is asked a few at a
 //! time, because the firmware has little room, and told when it is not answered; only `Stop`, which may be repeated, is
-//! sent again, and ahead of all that waits. A device that was reset knows nothing of the session: another one begins.
+//! sent again, and ahead of all that waits. A device that was reset knows nothing of the session: another one begins. A session
+//! that another program has taken is not taken back, which would go on for ever: the talk ends.
 //!
 //! Beside the talk of a user something else may go on that he does not see: what is asked aside waits for what he asks, and is
 //! answered aside. Who records takes a talk that is tapped, which tells every payload that goes over the line.
@@ -23,6 +24,7 @@ use blindgrasp_shared::parameters::Parameter;
 use blindgrasp_shared::supervisor::Mode;
 use blindgrasp_shared::telemetry::INTERFACE_VERSION;
 use std::collections::VecDeque;
+use std::hash::{BuildHasher as _, Hasher as _, RandomState};
 use std::io;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
@@ -63,6 +65,8 @@ pub enum Event {
         firmware: Firmware,
         /// Time from one of its ticks to the next, us.
         period_us: u32,
+        /// It has ended another program's, which was in use a moment ago.
+        ends_another: bool,
     },
     /// The device does not know the session: it was reset. What was asked is lost; hello is said again.
     StartedAnew,
@@ -105,6 +109,11 @@ pub enum TalkError {
         /// Its version.
         theirs: u16,
     },
+    /// Another program has said hello.
+    #[error(
+        "another program has said hello to this hand, and leads it now: see that one program alone has the line, then start this one again"
+    )]
+    SessionTaken,
     /// It answered, and does not any more.
     #[error("the line is lost: nothing came for {} s{}", .0.as_secs_f64(), heard(.1))]
     Silence(Duration, Traffic),
@@ -148,6 +157,8 @@ pub struct Talk {
     /// Payload of the last good frame.
     payload: Vec<u8>,
     tapped: bool,
+    /// Number that is wished for of a session: by chance, so that no other program has it.
+    wished: u16,
     /// Number of the session, if there is one.
     session: Option<u16>,
     /// Number of the last request.
@@ -179,6 +190,7 @@ impl Talk {
             listener: Listener::new(),
             payload: Vec::new(),
             tapped: false,
+            wished: RandomState::new().build_hasher().finish() as u16,
             session: None,
             sequence: 0,
             begun: now,
@@ -222,10 +234,17 @@ impl Talk {
         self.send_waiting(now);
     }
 
+    /// Ends the session, and the records. Nobody waits for the answer.
+    pub fn say_goodbye(&mut self, now: Instant) {
+        if self.session.is_some() {
+            self.send(Request::Goodbye, Asker::Talk, 1, now);
+        }
+    }
+
     /// Takes bytes that came.
     ///
     /// # Errors
-    /// If they come from a firmware of another interface version.
+    /// If they come from a firmware of another interface version, or another program has taken the session.
     pub fn take(&mut self, bytes: &[u8], now: Instant) -> Result<(), TalkError> {
         self.traffic.bytes_received += bytes.len() as u64;
         // Kept from one call to the next: frames come a thousand times a second.
@@ -353,7 +372,11 @@ impl Talk {
     fn send(&mut self, request: Request, asker: Asker, times: u8, now: Instant) {
         self.sequence = self.sequence.wrapping_add(1);
         let sequence = self.sequence;
-        let packet = Packet { session: self.session.unwrap_or(0), sequence, request };
+        let session = match request {
+            Request::Hello { .. } => self.wished,
+            _ => self.session.unwrap_or(0),
+        };
+        let packet = Packet { session, sequence, request };
         let mut buffer = [0; MOST_SENT];
         // The buffer is as large as the largest request.
         if let Ok(frame) = encode(&packet, &mut buffer) {
@@ -378,7 +401,7 @@ impl Talk {
                 self.look(record);
                 return Ok(());
             }
-            Reply::Identity { sequence, session, identity } => {
+            Reply::Identity { sequence, session, identity, ends_another } => {
                 let theirs = identity.image.interface_version;
                 if theirs != INTERFACE_VERSION {
                     return Err(TalkError::OtherInterface { theirs });
@@ -386,7 +409,7 @@ impl Talk {
                 if self.take_asked(sequence).is_some() {
                     let (firmware, period_us) = (Firmware::from(&identity), identity.image.period_us);
                     self.open(session, now);
-                    self.events.push_back(Event::Open { firmware, period_us });
+                    self.events.push_back(Event::Open { firmware, period_us, ends_another });
                 }
                 return Ok(());
             }
@@ -417,6 +440,9 @@ impl Talk {
         if let Some(ms) = heartbeat_ms {
             self.heartbeat = Duration::from_secs_f32((ms / HEARTBEATS).clamp(1.0, 1000.0) / 1e3);
             self.due = self.due.min(now + self.heartbeat);
+        }
+        if answer == Answer::Refused(Refusal::SessionTaken) {
+            return Err(TalkError::SessionTaken);
         }
         let is_forgotten = answer == Answer::Refused(Refusal::NoSession);
         match asker {

@@ -141,9 +141,75 @@ fn wait_for(
     }
 }
 
-/// A serial port.
+/// A serial port, which no other program has as long as it lives.
 pub struct SerialPort {
     port: serial2::SerialPort,
+    _lock: Lock,
+}
+
+/// The exclusive lock on a port. An advisory one (`flock`), which picocom and pyserial respect, too: that of the terminal
+/// itself (`TIOCEXCL`) does not keep root out, and stays on a pseudo-terminal when the program is killed.
+#[cfg(unix)]
+struct Lock {
+    _file: std::fs::File,
+}
+
+#[cfg(unix)]
+impl Lock {
+    /// Takes it.
+    ///
+    /// # Errors
+    /// If there is no such port, or another program has it: in words, and which one, if that is known.
+    fn take(path: &Path) -> io::Result<Self> {
+        use nix::fcntl::OFlag;
+        use std::fs::{OpenOptions, TryLockError};
+        use std::os::unix::fs::OpenOptionsExt as _;
+        // Neither waits for a carrier nor makes it this program's terminal.
+        let flags = (OFlag::O_NONBLOCK | OFlag::O_NOCTTY).bits();
+        let file = OpenOptions::new().read(true).write(true).custom_flags(flags).open(path)?;
+        match file.try_lock() {
+            Err(TryLockError::WouldBlock) => {
+                let who = holder(&file).unwrap_or_else(|| "another program".to_owned());
+                let words = format!("it is in use by {who}: end that first");
+                Err(io::Error::new(io::ErrorKind::ResourceBusy, words))
+            }
+            // Of a file system without locks nobody is kept out.
+            Ok(()) | Err(TryLockError::Error(_)) => Ok(Self { _file: file }),
+        }
+    }
+}
+
+/// The program that has locked a file, as Linux tells it.
+#[cfg(unix)]
+fn holder(file: &std::fs::File) -> Option<String> {
+    use std::os::unix::fs::MetadataExt as _;
+    let about = file.metadata().ok()?;
+    // The kernel's 12 and 20 bits.
+    let (device, inode) = (about.dev(), about.ino());
+    let (major, minor) = ((device >> 8) & 0xfff, (device & 0xff) | ((device >> 12) & 0xf_ff00));
+    let place = format!("{major:02x}:{minor:02x}:{inode}");
+    let locks = std::fs::read_to_string("/proc/locks").ok()?;
+    // 1: FLOCK ADVISORY WRITE 1234 00:1a:3 0 EOF
+    let locks = locks.lines().map(|line| line.split_whitespace().collect::<Vec<_>>());
+    let process = locks
+        .filter(|words| words.get(5) == Some(&place.as_str()))
+        .find_map(|words| words.get(4)?.parse::<u32>().ok().filter(|&process| process > 0))?;
+    if process == std::process::id() {
+        return Some("this program itself".to_owned());
+    }
+    let name = std::fs::read_to_string(format!("/proc/{process}/comm")).ok()?;
+    Some(format!("`{}`, process {process}", name.trim_end()))
+}
+
+/// Elsewhere a port is exclusive by itself.
+#[cfg(not(unix))]
+struct Lock;
+
+#[cfg(not(unix))]
+impl Lock {
+    fn take(_path: &Path) -> io::Result<Self> {
+        Ok(Self)
+    }
 }
 
 /// Why a serial port could not be opened.
@@ -181,8 +247,13 @@ impl SerialPort {
     /// # Errors
     /// Why not, and which ports there are.
     pub fn open(path: &Path, baud: u32) -> Result<Self, OpenError> {
-        match serial2::SerialPort::open(path, baud) {
-            Ok(port) => Ok(Self { port }),
+        // Locked before its settings are touched, which are the other program's, too.
+        let opened = Lock::take(path).and_then(|_lock| {
+            let port = serial2::SerialPort::open(path, baud)?;
+            Ok(Self { port, _lock })
+        });
+        match opened {
+            Ok(port) => Ok(port),
             Err(reason) => Err(OpenError { path: path.to_owned(), reason, known: known_ports() }),
         }
     }

@@ -6,7 +6,7 @@
 
 use super::exchange::Exchange;
 use super::model::{Level, News, Session};
-use crate::device::recorder::Recorder;
+use crate::device::recorder::{ENDED_ANOTHER, Recorder};
 use crate::device::talk::{self, Event, LineError, Talk, TalkError};
 use crate::device::transport::{self, Transport, TransportError};
 use crate::record::mcap::RecordingError;
@@ -73,6 +73,7 @@ impl Live {
             tell,
             fetched_ms: Arc::clone(&fetched_ms),
             recorder,
+            is_taken: false,
         };
         let thread = thread::spawn(move || follower.follow(&opened));
         match is_open.recv() {
@@ -127,6 +128,8 @@ struct Follower {
     tell: Sender<Told>,
     fetched_ms: Arc<AtomicU64>,
     recorder: Option<Recorder>,
+    /// Another program leads the hand: the line is left to it.
+    is_taken: bool,
 }
 
 impl Follower {
@@ -204,6 +207,8 @@ impl Follower {
                 return Ok(broken(&error));
             }
             if is_over {
+                talk.say_goodbye(now);
+                let _ = line.send(&talk.outgoing(), now + SENDING);
                 return Err(Over);
             }
             if now >= count_at {
@@ -218,6 +223,7 @@ impl Follower {
             match line.receive(&mut buffer, deadline) {
                 Ok(count) => {
                     if let Err(error) = talk.take(&buffer[..count], Instant::now()) {
+                        self.is_taken = error == TalkError::SessionTaken;
                         return Ok(self.lost(&error));
                     }
                 }
@@ -227,23 +233,25 @@ impl Follower {
         }
     }
 
-    /// Waits for the next attempt, and until somebody watches. What is asked meanwhile can't be sent.
+    /// Waits for the next attempt, and until somebody watches; for ever, if another program leads the hand. What is asked
+    /// meanwhile can't be sent.
     fn pause(&self) -> Result<(), Over> {
         let until = Instant::now() + AGAIN;
         loop {
             let left = until.saturating_duration_since(Instant::now());
-            if left.is_zero() && !self.is_unwatched() {
+            if left.is_zero() && !self.is_unwatched() && !self.is_taken {
                 return Ok(());
             }
             match self.asked.recv_timeout(left.max(SLICE)) {
                 Ok(Request::Command(command)) => {
                     let words = command.words();
+                    let why = if self.is_taken { "another program leads the hand" } else { "nobody answers" };
                     let words = match command {
                         Command::Stop => {
                             self.send(Told::Stopped(false));
-                            format!("{words}: NOT SENT, nobody answers: take the motors' power away")
+                            format!("{words}: NOT SENT, {why}: take the motors' power away")
                         }
-                        _ => format!("{words}: not sent, nobody answers"),
+                        _ => format!("{words}: not sent, {why}"),
                     };
                     self.note(Level::Error, words);
                 }
@@ -273,9 +281,12 @@ impl Follower {
                     self.news(News::Heartbeat);
                 }
             }
-            Event::Open { firmware, period_us } => {
+            Event::Open { firmware, period_us, ends_another } => {
                 ask_for_everything(&firmware, talk, now);
                 self.greet(firmware, period_us, exchange.session());
+                if ends_another {
+                    self.note(Level::Warning, ENDED_ANOTHER.into());
+                }
             }
             Event::StartedAnew => {
                 let words = "the device was reset: it has forgotten the session, and what was set";

@@ -19,7 +19,7 @@ use serde::{Deserialize, Serialize};
 /// A request, with whom it comes from and when.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Packet<const J: usize> {
-    /// Number of the session; whatever it likes for `Hello` and `Stop`.
+    /// Number of the session. For `Hello` the number that is wished for, best by chance, or 0; for `Stop` whatever it likes.
     pub session: u16,
     /// Number of the request.
     pub sequence: u16,
@@ -69,6 +69,8 @@ pub enum Request<const J: usize> {
         /// Which; 0 is the oldest.
         index: u16,
     },
+    /// End the session, and send no more records.
+    Goodbye,
 }
 
 /// Joints over the link.
@@ -154,6 +156,8 @@ pub enum Reply<'a, const J: usize> {
         /// Who it is.
         #[serde(borrow)]
         identity: Identity<'a>,
+        /// Whether this ends another session in which something was asked for a moment ago.
+        ends_another: bool,
     },
     /// Done, or why not.
     Answer {

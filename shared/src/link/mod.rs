@@ -49,6 +49,12 @@ pub use listener::{HearError, Heard, Listener};
 pub use receiver::{Counters, FrameError, Receiver};
 pub use sender::Sender;
 
+/// Whether a tick may take a request while there is room for so many more answers: what is done is also answered. The last
+/// place is a stop's, so that it waits for one at most behind another stop, which has done the same.
+pub const fn may_take(is_stop: bool, room: usize) -> bool {
+    room > !is_stop as usize
+}
+
 /// Ends a frame, and is nowhere inside it.
 const END: u8 = 0;
 
