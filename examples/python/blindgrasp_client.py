@@ -358,6 +358,7 @@ PACKET = Struct(
         Joints=Struct(counts=List(I32), failed=Option(FAULT), late=BOOL),
         Burst=Struct(index=U16),
         Goodbye=None,
+        Rate=Struct(baud=U32),
     ),
 )
 FIELDS = {

@@ -8,7 +8,7 @@ use crate::queue::HandPacket;
 #[cfg(target_os = "none")]
 use crate::{
     board::supply,
-    queue::{ControlEnd, Telemetry},
+    queue::{self, ControlEnd, Telemetry},
     schedule::Turn,
 };
 use blindgrasp_shared::command::{Answer, Command};
@@ -46,7 +46,7 @@ pub fn task(
     let last = Timing { supply_low: supply::take(), ..last };
     let outputs = control.turn(joints, packet, last, queues.dropped());
     if let Some(reply) = outputs.reply {
-        queues.answer(reply);
+        queues.answer(queue::Answer { reply, baud: outputs.baud });
     }
     if let Some(signals) = outputs.telemetry {
         queues.tell(Telemetry::Record(outputs.record, signals));

@@ -21,6 +21,7 @@ extern crate std;
 
 pub mod boards;
 pub mod control;
+pub mod divider;
 pub mod joints;
 pub mod link;
 pub mod model;

@@ -1,9 +1,10 @@
 //! Between the line and the control task: frames to packets, replies to frames. Runs when nothing else does.
 
 use crate::model::JOINTS;
-use crate::queue::{HandPacket, HandReply, LinkEnd, Telemetry};
+use crate::queue::{Answer, HandPacket, HandReply, LinkEnd, Telemetry};
 use blindgrasp_shared::command::Refusal;
-use blindgrasp_shared::link::message::{Packet, Reply, not_understood};
+use blindgrasp_shared::link::message::{Packet, Reply, Request, not_understood};
+use blindgrasp_shared::link::rate::{FIRST_BAUD, HandRate};
 use blindgrasp_shared::link::{Counters, Receiver, Sender, most_bytes};
 use heapless::Deque;
 
@@ -20,6 +21,10 @@ pub trait Port {
     fn is_silent(&self) -> bool;
     /// Sends a byte if the line can take it now.
     fn try_send(&mut self, byte: u8) -> bool;
+    /// Whether the last byte has left, with its stop bit.
+    fn is_sent(&self) -> bool;
+    /// Changes the rate, baud.
+    fn set_baud(&mut self, baud: u32);
 }
 
 /// Refusals that can wait to be sent: more than there are frames in the bytes that can wait to be looked at.
@@ -77,6 +82,11 @@ pub struct Link<'q, P> {
     frame: [u8; MOST_SENT],
     sent: usize,
     length: usize,
+    rate: HandRate,
+    /// The rate that the port has, baud.
+    baud: u32,
+    /// The rate that it is to have once the frame has left.
+    next_baud: Option<u32>,
 }
 
 impl<'q, P: Port> Link<'q, P> {
@@ -91,33 +101,55 @@ impl<'q, P: Port> Link<'q, P> {
             frame: [0; MOST_SENT],
             sent: 0,
             length: 0,
+            rate: HandRate::new(),
+            baud: FIRST_BAUD,
+            next_baud: None,
         }
     }
 
-    /// Does a small piece of what there is to do: all bytes that came, and a byte to send.
+    /// Does a small piece of what there is to do: the line's rate, all bytes that came, and a byte to send. Time is counted
+    /// in ticks of about a millisecond.
     ///
     /// While there is no room for another refusal, bytes wait where they are: every request is answered.
-    pub fn poll(&mut self) {
+    pub fn poll(&mut self, now_ms: u32) {
+        if self.sent == self.length
+            && self.port.is_sent()
+            && let Some(baud) = self.next_baud.take()
+        {
+            self.rate.answered(baud, now_ms);
+        }
+        let baud = self.rate.turn(now_ms);
+        if baud != self.baud {
+            self.port.set_baud(baud);
+            self.baud = baud;
+        }
         while !self.refusals.is_full()
             && let Some(byte) = self.port.receive()
         {
             let refusal = match self.frames.push(byte) {
                 None => continue,
-                Some(Received::Packet(packet)) => match self.queues.put(packet) {
-                    Ok(()) => continue,
-                    Err(packet) => (packet.sequence, Refusal::Busy),
-                },
+                Some(Received::Packet(packet)) => {
+                    self.rate.heard(matches!(packet.request, Request::Rate { .. }), now_ms);
+                    match self.queues.put(packet) {
+                        Ok(()) => continue,
+                        Err(packet) => (packet.sequence, Refusal::Busy),
+                    }
+                }
                 Some(Received::Unknown(sequence)) => (sequence, Refusal::NotUnderstood),
             };
             // There is room, so this can't fail.
             let _ = self.refusals.push_back(refusal);
         }
-        if self.sent == self.length {
+        if self.sent == self.length && self.next_baud.is_none() {
             // Who waits for an answer has done his part; a refusal can wait.
             let (sender, buffer) = (&mut self.sender, &mut self.frame);
-            let refusal = || self.refusals.pop_front().map(|(sequence, reason)| refused(sequence, reason));
+            let refusal =
+                || self.refusals.pop_front().map(|(sequence, reason)| refused(sequence, reason).into());
             let frame = match self.queues.answer().or_else(refusal) {
-                Some(reply) => sender.reply(&reply, buffer),
+                Some(Answer { reply, baud }) => {
+                    self.next_baud = baud;
+                    sender.reply(&reply, buffer)
+                }
                 None => match self.queues.telemetry() {
                     Some(Telemetry::Record(record, signals)) => sender.record(&record, signals, buffer),
                     Some(Telemetry::Part(part)) => sender.reply(&Reply::Snapshot(part), buffer),
@@ -139,6 +171,7 @@ impl<'q, P: Port> Link<'q, P> {
     /// Whether there is nothing to do until an interrupt.
     pub fn is_idle(&self) -> bool {
         self.sent == self.length
+            && self.next_baud.is_none()
             && self.refusals.is_empty()
             && self.queues.is_empty()
             && self.port.is_silent()
@@ -161,11 +194,11 @@ mod tests {
     use crate::queue::Queues;
     use blindgrasp_shared::command::Command;
     use blindgrasp_shared::link::encode;
-    use blindgrasp_shared::link::message::Request;
+    use blindgrasp_shared::link::rate::TRIAL_MS;
     use blindgrasp_shared::telemetry::List;
     use blindgrasp_shared::telemetry::snapshot::Part;
     use proptest::prelude::*;
-    use std::cell::RefCell;
+    use std::cell::{Cell, RefCell};
     use std::collections::VecDeque;
     use std::vec::Vec;
 
@@ -176,6 +209,10 @@ mod tests {
         sent: Vec<u8>,
         every: usize,
         tries: usize,
+        /// A byte is on its way out.
+        leaving: Cell<bool>,
+        /// Rates that it got, and after how many bytes.
+        bauds: Vec<(u32, usize)>,
     }
 
     impl Port for &RefCell<Wire> {
@@ -189,6 +226,14 @@ mod tests {
 
         fn try_send(&mut self, byte: u8) -> bool {
             (&mut *self.borrow_mut()).try_send(byte)
+        }
+
+        fn is_sent(&self) -> bool {
+            !self.borrow().leaving.replace(false)
+        }
+
+        fn set_baud(&mut self, baud: u32) {
+            (&mut *self.borrow_mut()).set_baud(baud);
         }
     }
 
@@ -206,8 +251,19 @@ mod tests {
             let is_free = self.tries.is_multiple_of(self.every.max(2));
             if is_free {
                 self.sent.push(byte);
+                self.leaving.set(true);
             }
             is_free
+        }
+
+        /// The last byte leaves a while after the line has taken it.
+        fn is_sent(&self) -> bool {
+            !self.leaving.replace(false)
+        }
+
+        fn set_baud(&mut self, baud: u32) {
+            assert!(!self.leaving.get(), "a byte is cut");
+            self.bauds.push((baud, self.sent.len()));
         }
     }
 
@@ -242,7 +298,7 @@ mod tests {
     /// Polls until there is nothing left to do.
     fn settle(link: &mut Link<'_, &mut Wire>) {
         for _ in 0..100_000 {
-            link.poll();
+            link.poll(0);
             if link.is_idle() {
                 return;
             }
@@ -285,7 +341,7 @@ mod tests {
             let mut tick = || match control.take() {
                 Some(packet) => {
                     taken.push(packet.sequence);
-                    control.answer(Reply::Answer { sequence: packet.sequence, refused: None });
+                    control.answer(Reply::Answer { sequence: packet.sequence, refused: None }.into());
                     true
                 }
                 None => {
@@ -305,14 +361,14 @@ mod tests {
                     sequence += 1;
                 }
                 for _ in 0..polls {
-                    link.poll();
+                    link.poll(0);
                 }
                 for _ in 0..ticks {
                     tick();
                 }
             }
             while !link.is_idle() || tick() {
-                (0..1000).for_each(|_| link.poll());
+                (0..1000).for_each(|_| link.poll(0));
             }
             let mut answers = wire.borrow().answers();
             answers.sort_unstable_by_key(|answer| answer.0);
@@ -346,11 +402,29 @@ mod tests {
         let mut queues = Queues::new();
         let (mut control, end) = queues.split();
         for sequence in 0..5 {
-            control.answer(Reply::Answer { sequence, refused: None });
+            control.answer(Reply::Answer { sequence, refused: None }.into());
         }
         settle(&mut Link::new(&mut wire, end));
         let expected: Vec<_> = (0..5).map(|sequence| (sequence, None)).collect();
         assert_eq!(wire.answers(), expected);
+    }
+
+    #[test]
+    fn the_rate_changes_once_the_answer_has_left_and_comes_back_by_itself() {
+        let mut wire = Wire { every: 5, ..Wire::default() };
+        let mut queues = Queues::new();
+        let (mut control, end) = queues.split();
+        for (sequence, baud) in [(1, None), (2, Some(3_000_000)), (3, None)] {
+            control.answer(Answer { reply: Reply::Answer { sequence, refused: None }, baud });
+        }
+        let mut link = Link::new(&mut wire, end);
+        settle(&mut link);
+        (0..TRIAL_MS).for_each(|now_ms| link.poll(now_ms));
+        assert_eq!((link.baud, link.port.bauds.len()), (3_000_000, 1));
+        link.poll(TRIAL_MS);
+        // Behind the second of three answers of the same length.
+        let length = wire.sent.len() / 3;
+        assert_eq!(wire.bauds, [(3_000_000, 2 * length), (FIRST_BAUD, 3 * length)]);
     }
 
     #[test]

@@ -17,6 +17,20 @@ pub type HandPacket = Packet<JOINTS>;
 /// A reply of this hand.
 pub type HandReply = Reply<'static, JOINTS>;
 
+/// An answer to a request.
+pub struct Answer {
+    /// What it says.
+    pub reply: HandReply,
+    /// The rate that the line is to have once it has left, baud.
+    pub baud: Option<u32>,
+}
+
+impl From<HandReply> for Answer {
+    fn from(reply: HandReply) -> Self {
+        Self { reply, baud: None }
+    }
+}
+
 /// What the hand tells by itself.
 pub enum Telemetry {
     /// What a tick did, and what of it is to be sent.
@@ -38,7 +52,7 @@ const STOPS: usize = 2;
 pub struct Queues {
     stops: Queue<HandPacket, STOPS>,
     packets: Queue<HandPacket, PACKETS>,
-    answers: Queue<HandReply, ANSWERS>,
+    answers: Queue<Answer, ANSWERS>,
     records: Queue<Telemetry, RECORDS>,
 }
 
@@ -71,7 +85,7 @@ impl Default for Queues {
 pub struct ControlEnd<'q> {
     stops: Consumer<'q, HandPacket>,
     packets: Consumer<'q, HandPacket>,
-    answers: Producer<'q, HandReply>,
+    answers: Producer<'q, Answer>,
     records: Producer<'q, Telemetry>,
     dropped: u32,
 }
@@ -85,8 +99,8 @@ impl ControlEnd<'_> {
     }
 
     /// Leaves the answer to the packet that was taken for the line. There is room for it.
-    pub fn answer(&mut self, reply: HandReply) {
-        let lost = enqueue(&mut self.answers, reply).is_err();
+    pub fn answer(&mut self, answer: Answer) {
+        let lost = enqueue(&mut self.answers, answer).is_err();
         self.dropped = self.dropped.saturating_add(u32::from(lost));
     }
 
@@ -106,7 +120,7 @@ impl ControlEnd<'_> {
 pub struct LinkEnd<'q> {
     stops: Producer<'q, HandPacket>,
     packets: Producer<'q, HandPacket>,
-    answers: Consumer<'q, HandReply>,
+    answers: Consumer<'q, Answer>,
     records: Consumer<'q, Telemetry>,
 }
 
@@ -124,7 +138,7 @@ impl LinkEnd<'_> {
     }
 
     /// The next answer to send. Answers go before all else.
-    pub fn answer(&mut self) -> Option<HandReply> {
+    pub fn answer(&mut self) -> Option<Answer> {
         dequeue(&mut self.answers)
     }
 
@@ -212,11 +226,12 @@ mod tests {
         }
         assert_eq!(control.dropped(), 3);
         for sequence in 0..ANSWERS as u16 - 1 {
-            control.answer(Reply::Answer { sequence, refused: None });
+            control.answer(Reply::Answer { sequence, refused: None }.into());
         }
         assert_eq!(control.dropped(), 3);
         for expected in 0..ANSWERS as u16 - 1 {
-            assert!(matches!(link.answer(), Some(Reply::Answer { sequence, .. }) if sequence == expected));
+            let reply = link.answer().map(|answer| answer.reply);
+            assert!(matches!(reply, Some(Reply::Answer { sequence, .. }) if sequence == expected));
         }
         for _ in 0..RECORDS - 1 {
             assert!(!link.is_empty() && link.telemetry().is_some());
@@ -246,7 +261,7 @@ mod tests {
                         if taken.is_some() {
                             stops_wait -= i32::from(is_stop);
                             last_was_stop = is_stop;
-                            control.answer(Reply::Answer { sequence: 0, refused: None });
+                            control.answer(Reply::Answer { sequence: 0, refused: None }.into());
                         }
                         prop_assert_eq!(control.dropped(), 0);
                     }

@@ -112,5 +112,6 @@ pub(crate) fn in_words(packet: Option<&Packet>) -> String {
         Request::Burst { index } => format!("record {index} of the burst"),
         Request::Joints(_) => "the joints of a tick".to_owned(),
         Request::Goodbye => "goodbye".to_owned(),
+        Request::Rate { baud } => format!("a line of {baud} baud"),
     }
 }

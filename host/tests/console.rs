@@ -10,6 +10,7 @@ use blindgrasp_shared::device::{Device, Inputs, Reading};
 use blindgrasp_shared::fault::{Fault, Raised};
 use blindgrasp_shared::identity::{Clock, Crash, CrashKind, Identity, Image, ResetCause};
 use blindgrasp_shared::link::message::Reply;
+use blindgrasp_shared::link::rate::{FIRST_BAUD, HandRate};
 use blindgrasp_shared::link::{Receiver, encode, most_bytes};
 use blindgrasp_shared::parameters::Parameter;
 use blindgrasp_shared::supervisor::Mode;
@@ -377,6 +378,72 @@ fn a_session_that_another_program_takes_ends_the_talk_and_is_told_to_both() {
 }
 
 #[test]
+fn the_rate_is_agreed_before_anything_else_is_asked() {
+    let wanted = [Some(3_000_000), Some(2_000_000), None];
+    let mut bench = Bench::new();
+    bench.talk = Talk::new(PATIENCE, bench.now).with_bauds(wanted);
+    bench.board.device = bench.board.device.with_faster_bauds(&[2_000_000]);
+    let (mut rate, mut asked) = (HandRate::new(), Vec::new());
+    let mut lost = 0;
+    for now_ms in 0..1000 {
+        // What is sent at another rate than the board has is lost.
+        let host_baud = bench.talk.baud();
+        bench
+            .run_with(1, |board, bytes| {
+                if rate.turn(now_ms) == host_baud {
+                    board.take(bytes);
+                } else {
+                    lost += bytes.len();
+                }
+                let request = board.waiting.front().map(|packet| packet.request.clone());
+                let said = board.tick();
+                let agreed = match request {
+                    Some(Request::Rate { baud }) => {
+                        rate.heard(true, now_ms);
+                        // It has only the one.
+                        (baud == 2_000_000).then_some(baud)
+                    }
+                    Some(_) => {
+                        rate.heard(false, now_ms);
+                        None
+                    }
+                    None => None,
+                };
+                asked.extend(request);
+                let heard = if rate.turn(now_ms) == host_baud { said } else { Vec::new() };
+                if let Some(baud) = agreed {
+                    rate.answered(baud, now_ms);
+                }
+                heard
+            })
+            .unwrap_or_else(|error| panic!("{error}"));
+    }
+    let hello = Request::Hello { interface_version: INTERFACE_VERSION };
+    let ask = |baud| Request::Rate { baud };
+    assert_eq!(asked[..4], [hello, ask(3_000_000), ask(2_000_000), ask(2_000_000)]);
+    assert!(!asked[4..].iter().any(|request| matches!(request, Request::Rate { .. })), "{asked:?}");
+    assert_eq!((bench.talk.baud(), rate.turn(1000), lost), (2_000_000, 2_000_000, 0));
+    let open = bench.events.iter().position(|event| matches!(event, Event::Open { .. }));
+    assert!(open.is_some() && bench.talk.is_idle());
+    // The hand was reset: it is found at the first rate, and greeted again.
+    bench.board = Board::new();
+    bench.events.clear();
+    for _ in 0..1000 {
+        let is_first = bench.talk.baud() == FIRST_BAUD;
+        bench
+            .run_with(1, |board, bytes| {
+                if is_first {
+                    board.take(bytes);
+                }
+                let said = board.tick();
+                if is_first { said } else { Vec::new() }
+            })
+            .unwrap_or_else(|error| panic!("{error}"));
+    }
+    assert!(bench.has_seen(&Event::StartedAnew) && bench.talk.baud() == FIRST_BAUD);
+}
+
+#[test]
 fn damaged_frames_are_counted_and_silence_is_noticed() {
     let mut bench = Bench::open();
     bench
@@ -555,7 +622,7 @@ mod command {
             "limits.torque_nm[3] = 0.05  (Largest torque of a joint, N m)",
             "damping_nm_s[200]: refused, this hand has no parameter with this index",
             "arm: done",
-            "force_n = 1: refused, parameters are set while the hand is disarmed",
+            "force_n = 1: refused, parameters and the line's rate are set while the hand is disarmed",
             "stop: done",
         ];
         assert_lines(&said, &lines);

@@ -526,6 +526,8 @@ fn misuse_is_told() {
     fs::write(&out, "mine").expect("a file");
     let port = link.to_str().expect("UTF-8");
     refused(&["record", "--out", path, "--port", port], &["is there already", "--force"]);
+    let can = ["--baud 2500000: ", "can't do that; it can do 3000000, 2000000, 1500000, 1000000"];
+    refused(&["record", "--out", path, "--port", port, "--force", "--baud", "2500000"], &can);
     assert_eq!(fs::read(&out).expect("the file"), b"mine");
     let mut record = Process::start(recorded(&out, &[&link], &["--force", "--duration", "1"]));
     assert_eq!(record.end(PATIENCE).0, Some(0));

@@ -97,7 +97,7 @@ refusals! {
     FallbackClock      = "the crystal did not start, so that the tick has no exact time: repair the board";
     NotFinite          = "a value is not a finite number";
     OutOfRange         = "a value is out of its range: the limits are parameters";
-    NotDisarmed        = "parameters are set while the hand is disarmed: disarm it, or clear its fault, first";
+    NotDisarmed        = "parameters and the line's rate are set while the hand is disarmed: disarm it, or clear its fault, first";
     NoSuchParameter    = "this hand has no parameter with this index";
     SwitchedOff        = "this limit is switched off in the hand's configuration";
     NoSession          = "there is no session of this number: say hello first";
@@ -111,6 +111,7 @@ refusals! {
     LawNotChosen       = "the law of this gain is not chosen: set its parameter `laws.` to 1, disarmed";
     BeyondFile         = "this is looser than the hand's file, and the line can only tighten: `get` shows what the file says";
     SessionTaken       = "another program has said hello to this hand since, which ended this session: only one may lead it";
+    NoSuchRate         = "this hand's line does not have this rate";
 }
 
 impl fmt::Display for Refusal {

@@ -9,6 +9,7 @@ use crate::event::{Event, Events};
 use crate::fault::Raised;
 use crate::identity::{Clock, Identity};
 use crate::link::message::{Packet, Reply, Request, Signals};
+use crate::link::rate::FIRST_BAUD;
 use crate::supervisor::Mode;
 use crate::telemetry::burst::{Burst, Caught};
 use crate::telemetry::snapshot::{Outgoing, Part};
@@ -61,6 +62,8 @@ pub struct Outputs<const J: usize> {
     pub telemetry: Option<Signals>,
     /// The answer to the request.
     pub reply: Option<Reply<'static, J>>,
+    /// The rate that the line is to have once the answer has left, baud.
+    pub baud: Option<u32>,
     /// A part of a snapshot that is to be sent.
     pub part: Option<Part>,
 }
@@ -74,6 +77,8 @@ pub struct Device<const J: usize, const F: usize> {
     session: Session,
     telemetry: Telemetry,
     snapshot: Outgoing<J>,
+    /// Rates that its line has besides the first.
+    faster_bauds: &'static [u32],
 }
 
 impl<const J: usize, const F: usize> Device<J, F> {
@@ -86,7 +91,14 @@ impl<const J: usize, const F: usize> Device<J, F> {
             session: Session::NONE,
             telemetry: Telemetry::OFF,
             snapshot: Outgoing::new(),
+            faster_bauds: &[],
         }
+    }
+
+    /// The same with a line that has faster rates than the first.
+    #[must_use]
+    pub fn with_faster_bauds(self, faster_bauds: &'static [u32]) -> Self {
+        Self { faster_bauds, ..self }
     }
 
     /// The parameters.
@@ -138,17 +150,23 @@ impl<const J: usize, const F: usize> Device<J, F> {
             output.record.sequence = self.telemetry.sent;
             self.telemetry.sent = self.telemetry.sent.wrapping_add(1);
         }
+        let baud = match asked {
+            Asked::Rate { baud, .. } => Some(baud),
+            _ => None,
+        };
         let reply = match asked {
             Asked::Nothing => None,
             Asked::Answered(reply) => Some(reply),
-            Asked::Heartbeat { sequence } => Some(Reply::Answer { sequence, refused: None }),
+            Asked::Heartbeat { sequence } | Asked::Rate { sequence, .. } => {
+                Some(Reply::Answer { sequence, refused: None })
+            }
             Asked::Command { sequence, .. } => {
                 let refused = output.record.answer.and_then(|answer| answer.refused);
                 Some(Reply::Answer { sequence, refused })
             }
         };
         let tick::Output { torques_nm, powered, record } = output;
-        Outputs { torques_nm, powered, record, telemetry, reply, part }
+        Outputs { torques_nm, powered, record, telemetry, reply, baud, part }
     }
 
     /// Saves the state where it is due, and the part of it that is to be sent now.
@@ -217,8 +235,13 @@ impl<const J: usize, const F: usize> Device<J, F> {
                 self.session.is_open = false;
                 self.telemetry.begin(0, Signals::NONE);
                 self.snapshot.stop();
-                answer(None)
+                Asked::Rate { sequence, baud: FIRST_BAUD }
             }
+            Request::Rate { .. } if self.state.mode() != Mode::Disarmed => answer(Some(Refusal::NotDisarmed)),
+            Request::Rate { baud } if baud == FIRST_BAUD || self.faster_bauds.contains(&baud) => {
+                Asked::Rate { sequence, baud }
+            }
+            Request::Rate { .. } => answer(Some(Refusal::NoSuchRate)),
             // Taken above.
             Request::Hello { .. } => answer(None),
         }
@@ -230,6 +253,7 @@ enum Asked<const J: usize> {
     Nothing,
     Answered(Reply<'static, J>),
     Heartbeat { sequence: u16 },
+    Rate { sequence: u16, baud: u32 },
     Command { sequence: u16, command: Command },
 }
 

@@ -165,6 +165,28 @@ fn no_hello_is_given_session_0_nor_one_of_the_last_two() {
 }
 
 #[test]
+fn a_rate_is_changed_while_disarmed_if_the_line_has_it() {
+    let rate = |baud| Request::Rate { baud };
+    let mut bench = Bench::new();
+    assert_eq!(bench.refused(rate(3_000_000)), Some(Refusal::NoSuchRate));
+    bench.device = bench.device.with_faster_bauds(&[3_000_000]);
+    let outputs = |bench: &mut Bench, request| {
+        let packet = bench.packet(request);
+        let outputs = bench.tick(Some(packet));
+        let Some(Reply::Answer { refused, .. }) = outputs.reply else { panic!("{outputs:?}") };
+        (refused, outputs.baud)
+    };
+    assert_eq!(outputs(&mut bench, rate(3_000_000)), (None, Some(3_000_000)));
+    assert_eq!(outputs(&mut bench, Request::Heartbeat), (None, None));
+    assert_eq!(outputs(&mut bench, rate(1_000_000)), (None, Some(1_000_000)));
+    assert_eq!(outputs(&mut bench, rate(2_000_000)), (Some(Refusal::NoSuchRate), None));
+    assert_eq!(outputs(&mut bench, ARM), (None, None));
+    assert_eq!(outputs(&mut bench, rate(3_000_000)), (Some(Refusal::NotDisarmed), None));
+    bench.done(Request::Command(Command::Disarm));
+    assert_eq!(outputs(&mut bench, Request::Goodbye), (None, Some(1_000_000)));
+}
+
+#[test]
 fn a_session_that_another_program_takes_is_told_to_both_and_told_apart_from_a_reset() {
     let begin = |bench: &mut Bench, wished| {
         bench.session = wished;

@@ -140,6 +140,7 @@ fn packets() -> Vec<(&'static str, Packet<J>)> {
         ),
         ("a record of the burst", Request::Burst { index: 191 }),
         ("goodbye", Request::Goodbye),
+        ("a rate", Request::Rate { baud: 3_000_000 }),
     ];
     let packet =
         |k: usize, (name, request)| (name, Packet { session: 1, sequence: 0x1234 + k as u16, request });
@@ -158,6 +159,7 @@ fn number(request: &Request<J>) -> usize {
         Request::Joints(_) => 6,
         Request::Burst { .. } => 7,
         Request::Goodbye => 8,
+        Request::Rate { .. } => 9,
     }
 }
 
@@ -630,7 +632,7 @@ fn streams() -> Vec<serde_json::Value> {
 fn every_message_is_among_the_vectors() {
     let mut requests: Vec<usize> = packets().iter().map(|(_, packet)| number(&packet.request)).collect();
     requests.dedup();
-    assert_eq!(requests, (0..9).collect::<Vec<_>>());
+    assert_eq!(requests, (0..10).collect::<Vec<_>>());
     let mut numbers: Vec<u8> = replies().iter().map(|(_, reply)| payload(&frame(reply))[0]).collect();
     numbers.dedup();
     assert_eq!(numbers, (0..dense::TAG).collect::<Vec<_>>());

@@ -260,7 +260,7 @@ mod emulated {
         assert!(err.contains("this hand has no parameter with this index"), "{err}");
         let (code, _, err) = ask(&["set", "force_n", "2"]);
         assert_eq!(code, Some(1));
-        assert!(err.contains("parameters are set while the hand is disarmed"), "{err}");
+        assert!(err.contains("set while the hand is disarmed"), "{err}");
 
         for arguments in
             [&["watch", "--seconds", "2", "--csv"][..], &["watch", "--seconds", "2", "--csv", "--full"]]

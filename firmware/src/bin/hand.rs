@@ -102,7 +102,7 @@ mod app {
     fn idle(cx: idle::Context) -> ! {
         let idle::LocalResources { link, report, .. } = cx.local;
         loop {
-            link.poll();
+            link.poll(schedule::ticks());
             report.poll(link.counters());
             // Without interrupts, so that one that comes after the look is not slept through: it ends the sleep, and is
             // served after it.

@@ -62,6 +62,9 @@ pub(crate) struct Arguments {
     /// The hand's file, if it is not built in: for angles and the joints' names
     #[arg(long, value_name = "HAND")]
     hand: Option<String>,
+    /// Rate of the line, baud [default: the fastest that hand and adapter can]
+    #[arg(long, value_name = "BAUD")]
+    baud: Option<u32>,
     /// Record everything that goes over the line, every tick included
     #[arg(long, value_name = "FILE.mcap")]
     out: Option<PathBuf>,
@@ -76,6 +79,7 @@ static INTERRUPTS: AtomicU32 = AtomicU32::new(0);
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
     let port = ports::given(arguments.port.as_deref())?;
     let mut line = talk::open(port)?;
+    let bauds = talk::wanted_bauds(&mut *line, port, arguments.baud)?;
     let recording =
         (arguments.out.as_ref()).map(|path| Recording::create(path, arguments.force)).transpose()?;
     let recorder = recording
@@ -89,8 +93,8 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
     });
     let mut console = Console {
         talk: match recorder {
-            Some(_) => Talk::new(talk::PATIENCE, Instant::now()).tapped(),
-            None => Talk::new(talk::PATIENCE, Instant::now()),
+            Some(_) => Talk::new(talk::PATIENCE, Instant::now()).with_bauds(bauds).tapped(),
+            None => Talk::new(talk::PATIENCE, Instant::now()).with_bauds(bauds),
         },
         recorder,
         wanted_hand: arguments.hand.clone(),
@@ -228,6 +232,7 @@ impl Console {
                 return Ok(());
             }
             self.obey(now)?;
+            line.set_baud(self.talk.baud()).map_err(lost)?;
             line.send(&self.talk.outgoing(), now + SENDING).map_err(lost)?;
             let deadline = self.talk.due().clamp(now + Duration::from_millis(1), now + SLICE);
             match line.receive(&mut buffer, deadline) {

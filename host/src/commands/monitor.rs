@@ -50,6 +50,9 @@ pub(crate) struct Arguments {
     /// The hand's file, if it is not built in: for angles and the joints' names
     #[arg(long, value_name = "HAND")]
     hand: Option<String>,
+    /// Rate of the line, baud [default: the fastest that hand and adapter can]
+    #[arg(long, value_name = "BAUD", conflicts_with = "file")]
+    baud: Option<u32>,
     /// Which device of the recording; the first, if nothing is said
     #[arg(long, value_name = "NAME", requires = "file")]
     device: Option<String>,
@@ -91,7 +94,7 @@ fn watch(port: &str, arguments: &Arguments) -> anyhow::Result<Outcome> {
         arguments.out.as_ref().map(|path| Recording::create(path, arguments.force)).transpose()?;
     let hands = arguments.hand.as_slice();
     let recorder = recording.as_ref().map(|recording| recording.add("hand", port, hands, EVERY_TICK));
-    let live = Live::open(port, arguments.hand.as_deref(), recorder)?;
+    let live = Live::open(port, arguments.baud, arguments.hand.as_deref(), recorder)?;
     let mut terminal = Restored::new()?;
     let mut monitor = Monitor::new();
     let ended = monitor.watch(&mut terminal.0, &live, port, recording.as_ref());

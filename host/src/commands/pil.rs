@@ -8,7 +8,7 @@ use blindgrasp::device::build::pil_image;
 use blindgrasp::device::client::{Client, Patience, Traffic};
 use blindgrasp::device::interrupt;
 use blindgrasp::device::pil::{Linked, Pilot, Plan};
-use blindgrasp::device::transport::{BAUD, SerialPort, Transport};
+use blindgrasp::device::transport::{SerialPort, Transport};
 use blindgrasp::record::compare::{Comparison, Difference};
 use blindgrasp::scene::{HandModel, Scene};
 use blindgrasp::sim::Simulation;
@@ -102,7 +102,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
     }
     let plan = Plan::new(&scene).with_context(|| format!("scene {}", scene.name))?;
     let transport = match &arguments.port {
-        Some(port) => Box::new(SerialPort::open(port, BAUD)?),
+        Some(port) => Box::new(SerialPort::open(port)?),
         None => emulated(&image(arguments, &plan.hand, &scene)?, arguments.uart)?,
     };
     let linked = Linked::connect(&plan, Client::new(transport, Patience::default()))?;

@@ -52,6 +52,9 @@ pub(crate) struct Arguments {
     /// A hand's file, if it is not built in: for angles and the joints' names; may be repeated
     #[arg(long = "hand", value_name = "HAND")]
     hands: Vec<String>,
+    /// Rate of the line, baud [default: the fastest that hand and adapter can]
+    #[arg(long, value_name = "BAUD")]
+    baud: Option<u32>,
     /// Record one in so many ticks
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..))]
     decimation: u16,
@@ -143,7 +146,11 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
         return Err(unknown.into());
     }
     interrupt::listen();
-    let lines = ports.iter().map(|port| talk::open(port)).collect::<Result<Vec<_>, _>>()?;
+    let mut lines = ports.iter().map(|port| talk::open(port)).collect::<Result<Vec<_>, _>>()?;
+    for (port, line) in ports.iter().zip(&mut lines) {
+        // Told before there is a file.
+        talk::wanted_bauds(&mut **line, port, arguments.baud)?;
+    }
     let recording = Recording::create(out, arguments.force)?;
     let bar = ProgressBar::new_spinner();
     // What is said to a terminal that is none goes nowhere.
@@ -161,6 +168,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
             let attendant = Attendant {
                 k,
                 port,
+                baud: arguments.baud,
                 recorder,
                 tell: tell.clone(),
                 ending: &ending,
@@ -316,6 +324,8 @@ fn describe(report: &Report) -> String {
 struct Attendant<'a> {
     k: usize,
     port: &'a str,
+    /// The rate that is asked for.
+    baud: Option<u32>,
     recorder: Recorder,
     tell: Sender<News>,
     /// Somebody else has an error.
@@ -412,7 +422,11 @@ impl Attendant<'_> {
     /// Until the line is cut.
     fn listen(&mut self, line: &mut dyn Transport, cut_at: &mut Option<Instant>) -> Cut {
         let begun = Instant::now();
-        let mut talk = Talk::new(talk::PATIENCE, begun).tapped();
+        let bauds = match talk::wanted_bauds(line, self.port, self.baud) {
+            Ok(bauds) => bauds,
+            Err(error) => return Cut::Line(error.into()),
+        };
+        let mut talk = Talk::new(talk::PATIENCE, begun).with_bauds(bauds).tapped();
         let cut = loop {
             if let Err(cut) = self.turn(&mut talk, line, cut_at) {
                 break cut;
@@ -452,6 +466,7 @@ impl Attendant<'_> {
         if self.recorder.turn(talk, now)? {
             let _ = self.tell.send(News::Status(self.k, self.recorder.totals()));
         }
+        line.set_baud(talk.baud())?;
         line.send(&talk.outgoing(), now + SENDING)?;
         let deadline = talk.due().clamp(now + Duration::from_millis(1), now + SLICE);
         let mut buffer = [0; 4096];

@@ -7,8 +7,8 @@ use blindgrasp::device::line::Line;
 use blindgrasp::device::pty::{Link, Pty};
 use blindgrasp::device::serve::{News, Served, serve};
 use blindgrasp::device::simulated::{Happening, SimulatedHand};
-use blindgrasp::device::transport::BAUD;
 use blindgrasp::scene::Scene;
+use blindgrasp_shared::link::rate::FIRST_BAUD;
 use clap::Args;
 use std::io::{self, Write as _};
 use std::path::PathBuf;
@@ -28,7 +28,7 @@ pub(crate) struct Arguments {
     #[arg(long, value_name = "PATH")]
     link: Option<PathBuf>,
     /// Speed of the line to the host; 0 for one that is as fast as the host
-    #[arg(long, value_name = "BAUD", default_value_t = BAUD)]
+    #[arg(long, value_name = "BAUD", default_value_t = FIRST_BAUD)]
     baud: u32,
     /// Let the first joint's encoder fail for 0.1 s, so many seconds after each grasp
     #[arg(long, value_name = "S", value_parser = seconds)]

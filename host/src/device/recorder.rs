@@ -6,7 +6,6 @@
 //! has a state to go on from. What was caught around a fault is read slowly, in the time that the records leave on the line.
 
 use super::talk::{Event, Talk};
-use super::transport::BAUD;
 use crate::MAX_JOINTS;
 use crate::record::mcap::{About, Device, Level, LinkStatus, RecordingError, Saved, Setting, Stamp, Writer};
 use crate::scene::{HandFile, HandModel};
@@ -381,7 +380,7 @@ impl Recorder {
         let mut about = About::of(&who);
         about.port = Some(self.port.clone());
         // A socket or a pseudo-terminal has no speed, but what is behind it does.
-        about.baud = Some(BAUD);
+        about.baud = Some(talk.baud());
         let hand = self.hand(firmware);
         if let Some(file) = &hand {
             about = about.with_hand(file);

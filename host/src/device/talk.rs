@@ -7,18 +7,22 @@
 //! sent again, and ahead of all that waits. A device that was reset knows nothing of the session: another one begins. A session
 //! that another program has taken is not taken back, which would go on for ever: the talk ends.
 //!
+//! A session begins with the line's rate, before anything else is asked: the talk says at which rate the line is to be, and whoever
+//! has the line sees to it.
+//!
 //! Beside the talk of a user something else may go on that he does not see: what is asked aside waits for what he asks, and is
 //! answered aside. Who records takes a talk that is tapped, which tells every payload that goes over the line.
 
 use super::client::{Patience, Traffic};
 #[cfg(unix)]
 use super::transport::Streams;
-use super::transport::{BAUD, OpenError, SerialPort, Transport};
+use super::transport::{OpenError, SerialPort, Transport};
 use crate::MAX_JOINTS;
 use crate::wire::{Answer, Firmware, Packet, Record, Request, other_interface};
 use blindgrasp_shared::command::{Command, Refusal};
 use blindgrasp_shared::fault::Raised;
 use blindgrasp_shared::link::message::{Reply, Signals};
+use blindgrasp_shared::link::rate::{self, FASTER_BAUDS, FIRST_BAUD, HostRate, Wanted};
 use blindgrasp_shared::link::{HearError, Listener, Receiver, encode, most_bytes};
 use blindgrasp_shared::parameters::Parameter;
 use blindgrasp_shared::supervisor::Mode;
@@ -40,6 +44,10 @@ const HELLO_AGAIN: Duration = Duration::from_millis(500);
 const HEARTBEAT: Duration = Duration::from_millis(50);
 /// Heartbeats in the time that they may fail.
 const HEARTBEATS: f32 = 3.0;
+/// The longest time from one to the next, ms: at a fast rate a hand takes silence for the end.
+const HEARTBEAT_MOST_MS: f32 = 300.0;
+/// From one look at what is to be agreed about the rate to the next.
+const RATE_TURN: Duration = Duration::from_millis(10);
 /// How long a `Stop` may be unanswered before it is sent again, and how often it is sent.
 const STOP_AGAIN: Duration = Duration::from_millis(100);
 const STOPS: u8 = 5;
@@ -59,7 +67,7 @@ pub const PATIENCE: Patience = Patience { start: Duration::from_secs(3), answer:
 /// What happened.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Event {
-    /// A session began.
+    /// A session began, and the line's rate is agreed.
     Open {
         /// With whom.
         firmware: Firmware,
@@ -124,7 +132,7 @@ fn heard(traffic: &Traffic) -> String {
     match traffic {
         Traffic { frames_received: 0, frames_damaged: 0, bytes_received: 0, .. } => String::new(),
         Traffic { frames_received: 0, bytes_received, .. } => format!(
-            " but garbage ({bytes_received} bytes without a good frame: another program, or not {BAUD} baud)"
+            " but garbage ({bytes_received} bytes without a good frame: another program, or not {FIRST_BAUD} baud)"
         ),
         traffic => format!(" (so far {traffic})"),
     }
@@ -161,6 +169,12 @@ pub struct Talk {
     wished: u16,
     /// Number of the session, if there is one.
     session: Option<u16>,
+    /// Told when the rate is agreed.
+    opening: Option<Event>,
+    rate: HostRate,
+    wanted_bauds: Wanted,
+    /// Since when the time of the rate is counted.
+    start: Instant,
     /// Number of the last request.
     sequence: u16,
     /// Since when hello is said.
@@ -192,6 +206,10 @@ impl Talk {
             tapped: false,
             wished: RandomState::new().build_hasher().finish() as u16,
             session: None,
+            opening: None,
+            rate: HostRate::new(),
+            wanted_bauds: [None; FASTER_BAUDS.len()],
+            start: now,
             sequence: 0,
             begun: now,
             heard: now,
@@ -205,6 +223,23 @@ impl Talk {
             state: None,
             traffic: Traffic::default(),
         }
+    }
+
+    /// The same over a line that may have other rates, of which the first is wanted that the hand has, too.
+    #[must_use]
+    pub fn with_bauds(mut self, wanted: Wanted) -> Self {
+        self.wanted_bauds = wanted;
+        self
+    }
+
+    /// The rate that the line is to have for what is sent now, baud.
+    pub fn baud(&self) -> u32 {
+        self.rate.baud()
+    }
+
+    /// Time as the rate counts it.
+    fn ms(&self, now: Instant) -> u32 {
+        now.saturating_duration_since(self.start).as_millis() as u32
     }
 
     /// The same, telling every payload that goes over the line.
@@ -266,6 +301,7 @@ impl Talk {
             }
             self.traffic.frames_received += 1;
             self.heard = now;
+            self.rate.heard(self.ms(now));
             if self.tapped {
                 self.events.push_back(Event::Received(payload.clone()));
             }
@@ -309,7 +345,14 @@ impl Talk {
                 Asker::Aside => self.events.push_back(Event::Aside(request, None)),
             }
         }
-        if now >= self.due {
+        if self.session.is_some()
+            && let Some(baud) = self.rate.turn(self.ms(now))
+        {
+            self.send(Request::Rate { baud }, Asker::Talk, 1, now);
+        }
+        if !self.rate.is_settled() {
+            self.due = now + RATE_TURN;
+        } else if now >= self.due {
             let request = match self.session {
                 None => {
                     // Whatever was on the line before ends here. Of hellos, only the last one's session lasts.
@@ -348,6 +391,7 @@ impl Talk {
     /// Whether there is a session, and everything that was asked is answered.
     pub fn is_idle(&self) -> bool {
         self.session.is_some()
+            && self.rate.is_settled()
             && self.waiting.is_empty()
             && !self.asked.iter().any(|asked| asked.asker == Asker::User)
     }
@@ -358,6 +402,13 @@ impl Talk {
     }
 
     fn send_waiting(&mut self, now: Instant) {
+        if !self.rate.is_settled() {
+            return;
+        }
+        if let Some(opening) = self.opening.take() {
+            self.events.push_back(opening);
+            self.due = now;
+        }
         let busy = |asked: &&Asked| asked.request != Request::Heartbeat;
         while self.session.is_some()
             && self.asked.iter().filter(busy).count() < WINDOW
@@ -409,7 +460,7 @@ impl Talk {
                 if self.take_asked(sequence).is_some() {
                     let (firmware, period_us) = (Firmware::from(&identity), identity.image.period_us);
                     self.open(session, now);
-                    self.events.push_back(Event::Open { firmware, period_us, ends_another });
+                    self.opening = Some(Event::Open { firmware, period_us, ends_another });
                 }
                 return Ok(());
             }
@@ -438,11 +489,19 @@ impl Talk {
             _ => None,
         };
         if let Some(ms) = heartbeat_ms {
-            self.heartbeat = Duration::from_secs_f32((ms / HEARTBEATS).clamp(1.0, 1000.0) / 1e3);
+            self.heartbeat = Duration::from_secs_f32((ms / HEARTBEATS).clamp(1.0, HEARTBEAT_MOST_MS) / 1e3);
             self.due = self.due.min(now + self.heartbeat);
         }
         if answer == Answer::Refused(Refusal::SessionTaken) {
             return Err(TalkError::SessionTaken);
+        }
+        if let Request::Rate { .. } = request {
+            let asked = match answer {
+                Answer::Refused(Refusal::NoSuchRate) => rate::Asked::NoSuchRate,
+                Answer::Refused(_) => rate::Asked::Refused,
+                _ => rate::Asked::Done,
+            };
+            self.rate.answered(asked, self.ms(now));
         }
         let is_forgotten = answer == Answer::Refused(Refusal::NoSession);
         match asker {
@@ -469,6 +528,7 @@ impl Talk {
         self.session = Some(session);
         self.listener = Listener::new();
         (self.heartbeat, self.due) = (HEARTBEAT, now);
+        self.rate.begin(self.wanted_bauds, self.ms(now));
         let heartbeat = Request::GetParameter { parameter: Parameter::HEARTBEAT_TIME, index: 0 };
         // Ahead of what the user asked for meanwhile.
         self.waiting.push_front((telemetry(SELDOM), Asker::Talk));
@@ -479,6 +539,7 @@ impl Talk {
         self.session = None;
         (self.begun, self.due, self.state) = (now, now, None);
         self.listener = Listener::new();
+        self.opening = None;
         self.events.push_back(Event::StartedAnew);
         // Who asked aside begins anew, too.
         self.aside.clear();
@@ -508,6 +569,16 @@ pub enum LineError {
     /// It is no serial port that can be used.
     #[error(transparent)]
     Serial(#[from] OpenError),
+    /// It can't have the rate that was asked for.
+    #[error("--baud {baud}: {port} can't do that; it can do {}", in_words(.can))]
+    NoSuchRate {
+        /// The port.
+        port: String,
+        /// The rate.
+        baud: u32,
+        /// What it can do.
+        can: Wanted,
+    },
     /// Nobody listens at a socket.
     #[error("cannot connect to the socket {}: does somebody listen there?", .path.display())]
     Socket {
@@ -516,6 +587,26 @@ pub enum LineError {
         /// Why not.
         source: io::Error,
     },
+}
+
+/// Rates in words, and the first rate, which every line has.
+fn in_words(bauds: &Wanted) -> String {
+    let faster: String = bauds.iter().flatten().map(|baud| format!("{baud}, ")).collect();
+    format!("{faster}{FIRST_BAUD}")
+}
+
+/// Rates that are wanted of a line: the one that is asked for, or all that it can have.
+///
+/// # Errors
+/// If it can't have the one.
+pub fn wanted_bauds(line: &mut dyn Transport, port: &str, baud: Option<u32>) -> Result<Wanted, LineError> {
+    let can = line.bauds();
+    match baud {
+        None => Ok(can),
+        Some(FIRST_BAUD) => Ok([None; FASTER_BAUDS.len()]),
+        Some(baud) if can.contains(&Some(baud)) => Ok(can.map(|one| one.filter(|&one| one == baud))),
+        Some(baud) => Err(LineError::NoSuchRate { port: port.to_owned(), baud, can }),
+    }
 }
 
 /// Opens a line: a serial port, or `unix:PATH`, a socket at which somebody listens, such as QEMU.
@@ -533,5 +624,5 @@ pub fn open(port: &str) -> Result<Box<dyn Transport + Send>, LineError> {
         let socket = connect().map_err(|source| LineError::Socket { path: path.into(), source })?;
         return Ok(Box::new(socket));
     }
-    Ok(Box::new(SerialPort::open(Path::new(port), BAUD)?))
+    Ok(Box::new(SerialPort::open(Path::new(port))?))
 }

@@ -1,12 +1,11 @@
 //! Bytes to a device and back.
 
 use super::interrupt;
+use blindgrasp_shared::link::rate::{FASTER_BAUDS, FIRST_BAUD, Wanted};
 use std::io;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
-/// Speed of the serial line that every firmware begins with, baud.
-pub const BAUD: u32 = 1_000_000;
 /// How long nothing is looked at but the line.
 const SLICE: Duration = Duration::from_millis(100);
 
@@ -41,6 +40,19 @@ pub trait Transport {
     /// If there are none by `deadline`.
     fn receive(&mut self, buffer: &mut [u8], deadline: Instant) -> Result<usize, TransportError>;
 
+    /// Rates that it can have besides the first.
+    fn bauds(&mut self) -> Wanted {
+        [None; FASTER_BAUDS.len()]
+    }
+
+    /// Changes the rate, once what was sent has left.
+    ///
+    /// # Errors
+    /// If it can't have it.
+    fn set_baud(&mut self, _baud: u32) -> Result<(), TransportError> {
+        Ok(())
+    }
+
     /// What is known of the other end that may explain a failure: a sentence or more.
     fn trouble(&mut self) -> Option<String> {
         None
@@ -54,6 +66,14 @@ impl<T: Transport + ?Sized> Transport for Box<T> {
 
     fn receive(&mut self, buffer: &mut [u8], deadline: Instant) -> Result<usize, TransportError> {
         (**self).receive(buffer, deadline)
+    }
+
+    fn bauds(&mut self) -> Wanted {
+        (**self).bauds()
+    }
+
+    fn set_baud(&mut self, baud: u32) -> Result<(), TransportError> {
+        (**self).set_baud(baud)
     }
 
     fn trouble(&mut self) -> Option<String> {
@@ -144,6 +164,7 @@ fn wait_for(
 /// A serial port, which no other program has as long as it lives.
 pub struct SerialPort {
     port: serial2::SerialPort,
+    baud: u32,
     _lock: Lock,
 }
 
@@ -242,24 +263,53 @@ fn ports(known: &[PathBuf]) -> String {
 }
 
 impl SerialPort {
-    /// Opens a port: 8 bits, no parity, one stop bit.
+    /// Opens a port at the first rate: 8 bits, no parity, one stop bit.
     ///
     /// # Errors
     /// Why not, and which ports there are.
-    pub fn open(path: &Path, baud: u32) -> Result<Self, OpenError> {
+    pub fn open(path: &Path) -> Result<Self, OpenError> {
         // Locked before its settings are touched, which are the other program's, too.
         let opened = Lock::take(path).and_then(|_lock| {
-            let port = serial2::SerialPort::open(path, baud)?;
-            Ok(Self { port, _lock })
+            let port = serial2::SerialPort::open(path, FIRST_BAUD)?;
+            Ok(Self { port, baud: FIRST_BAUD, _lock })
         });
         match opened {
             Ok(port) => Ok(port),
             Err(reason) => Err(OpenError { path: path.to_owned(), reason, known: known_ports() }),
         }
     }
+
+    /// Tells the driver, which answers with what the adapter really does.
+    fn apply(&mut self, baud: u32) -> io::Result<()> {
+        let mut settings = self.port.get_configuration()?;
+        settings.set_baud_rate(baud)?;
+        self.port.set_configuration(&settings)?;
+        let real = self.port.get_configuration()?.get_baud_rate()?;
+        if real.abs_diff(baud) > baud / 100 {
+            let words = format!("the adapter has {real} baud where {baud} were wanted");
+            return Err(io::Error::new(io::ErrorKind::Unsupported, words));
+        }
+        self.baud = baud;
+        Ok(())
+    }
 }
 
 impl Transport for SerialPort {
+    fn bauds(&mut self) -> Wanted {
+        let before = self.baud;
+        let bauds = FASTER_BAUDS.map(|baud| self.apply(baud).is_ok().then_some(baud));
+        // It was so a moment ago.
+        let _ = self.apply(before);
+        bauds
+    }
+
+    fn set_baud(&mut self, baud: u32) -> Result<(), TransportError> {
+        if baud != self.baud {
+            self.apply(baud)?;
+        }
+        Ok(())
+    }
+
     fn send(&mut self, mut bytes: &[u8], deadline: Instant) -> Result<(), TransportError> {
         while !bytes.is_empty() {
             self.port.set_write_timeout(slice(deadline)?)?;
@@ -342,7 +392,7 @@ mod tests {
 
     #[test]
     fn a_port_that_is_not_there_is_told_with_those_that_are() {
-        let error = SerialPort::open(Path::new("/dev/no-such-port"), 1_000_000).err().unwrap().to_string();
+        let error = SerialPort::open(Path::new("/dev/no-such-port")).err().unwrap().to_string();
         assert!(error.starts_with("cannot open the serial port /dev/no-such-port: "), "{error}");
         assert!(error.contains("this machine has "), "{error}");
     }

@@ -14,6 +14,7 @@ use crate::scene::HandModel;
 use crate::wire::{Answer, Firmware, Request};
 use blindgrasp_shared::command::{self, Command, Refusal};
 use blindgrasp_shared::link::message::Signals;
+use blindgrasp_shared::link::rate::Wanted;
 use blindgrasp_shared::parameters::Parameter;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -54,12 +55,18 @@ pub struct Live {
 }
 
 impl Live {
-    /// Opens a line, and says hello all the time from then on. `hand` is the file of the hand, if it is not built in;
+    /// Opens a line, and says hello all the time from then on. `baud` is the line's rate, if not the fastest that
+    /// there is; `hand` is the file of the hand, if it is not built in;
     /// `recorder` writes down what goes over the line.
     ///
     /// # Errors
     /// If the line can't be opened now.
-    pub fn open(port: &str, hand: Option<&str>, recorder: Option<Recorder>) -> Result<Self, LineError> {
+    pub fn open(
+        port: &str,
+        baud: Option<u32>,
+        hand: Option<&str>,
+        recorder: Option<Recorder>,
+    ) -> Result<Self, LineError> {
         let begun = Instant::now();
         let (orders, asked) = mpsc::channel();
         let (tell, told) = mpsc::channel();
@@ -68,6 +75,7 @@ impl Live {
         let follower = Follower {
             begun,
             port: port.to_owned(),
+            baud,
             hand: hand.map(str::to_owned),
             asked,
             tell,
@@ -123,6 +131,7 @@ struct Over;
 struct Follower {
     begun: Instant,
     port: String,
+    baud: Option<u32>,
     hand: Option<String>,
     asked: Receiver<Request>,
     tell: Sender<Told>,
@@ -137,12 +146,16 @@ impl Follower {
     fn follow(mut self, opened: &Sender<Result<(), LineError>>) {
         let mut is_first = true;
         loop {
-            let why = match talk::open(&self.port) {
-                Ok(mut line) => {
+            let line = talk::open(&self.port).and_then(|mut line| {
+                let bauds = talk::wanted_bauds(&mut *line, &self.port, self.baud)?;
+                Ok((line, bauds))
+            });
+            let why = match line {
+                Ok((mut line, bauds)) => {
                     if std::mem::take(&mut is_first) {
                         let _ = opened.send(Ok(()));
                     }
-                    match self.talk(&mut *line) {
+                    match self.talk(&mut *line, bauds) {
                         Ok(why) => why,
                         Err(Over) => break,
                     }
@@ -174,8 +187,8 @@ impl Follower {
     }
 
     /// Talks until the line is lost; returns why.
-    fn talk(&mut self, line: &mut dyn Transport) -> Result<String, Over> {
-        let mut talk = Talk::new(talk::PATIENCE, Instant::now()).tapped();
+    fn talk(&mut self, line: &mut dyn Transport, bauds: Wanted) -> Result<String, Over> {
+        let mut talk = Talk::new(talk::PATIENCE, Instant::now()).with_bauds(bauds).tapped();
         let mut exchange = Exchange::default();
         let mut buffer = [0; 4096];
         let (mut counted, mut count_at) = (*talk.traffic(), Instant::now());
@@ -203,7 +216,8 @@ impl Follower {
                     Err(TryRecvError::Disconnected) => break true,
                 }
             };
-            if let Err(error) = line.send(&talk.outgoing(), now + SENDING) {
+            let sent = line.set_baud(talk.baud()).and_then(|()| line.send(&talk.outgoing(), now + SENDING));
+            if let Err(error) = sent {
                 return Ok(broken(&error));
             }
             if is_over {
@@ -283,7 +297,7 @@ impl Follower {
             }
             Event::Open { firmware, period_us, ends_another } => {
                 ask_for_everything(&firmware, talk, now);
-                self.greet(firmware, period_us, exchange.session());
+                self.greet(firmware, period_us, talk.baud(), exchange.session());
                 if ends_another {
                     self.note(Level::Warning, ENDED_ANOTHER.into());
                 }
@@ -344,13 +358,13 @@ impl Follower {
         }
     }
 
-    fn greet(&self, firmware: Firmware, period_us: u32, number: Option<u16>) {
+    fn greet(&self, firmware: Firmware, period_us: u32, baud: u32, number: Option<u16>) {
         let Firmware { words, hand: hand_name, hand_hash, joint_count, clock_hz, .. } = firmware;
         let hand = known_hand(self.hand.as_deref(), &hand_name, hand_hash);
         self.note(Level::Info, format!("a session: {words}"));
         let firmware = words.split(',').next().unwrap_or_default().to_owned();
         let session =
-            Session { number, firmware, hand_name, hand_hash, joint_count, period_us, clock_hz, hand };
+            Session { number, firmware, hand_name, hand_hash, joint_count, period_us, clock_hz, baud, hand };
         self.news(News::Open(Box::new(session)));
     }
 

@@ -5,13 +5,13 @@
 
 use super::history::{History, Range};
 use super::rate::Rate;
-use crate::device::transport::BAUD;
 use crate::scene::HandModel;
 use crate::wire::Record;
 use blindgrasp_shared::command::{Command, Refusal};
 use blindgrasp_shared::control::{GAIN_COUNT, GAINS, Gain};
 use blindgrasp_shared::event;
 use blindgrasp_shared::limit::Limiting;
+use blindgrasp_shared::link::rate::FIRST_BAUD;
 use blindgrasp_shared::parameters::Parameter;
 use blindgrasp_shared::supervisor::{self, Mode, Outcome};
 use std::collections::VecDeque;
@@ -52,6 +52,8 @@ pub struct Session {
     pub period_us: u32,
     /// Frequency of the clock that its cycles are counted in, Hz; 0 where nothing counts them.
     pub clock_hz: u32,
+    /// Rate of the line, baud.
+    pub baud: u32,
     /// Its hand, or why that is not known.
     pub hand: Result<Box<HandModel>, String>,
 }
@@ -446,7 +448,8 @@ impl Model {
 
     /// Share of the serial line that the device uses.
     pub fn line_share(&self, now: Duration) -> f64 {
-        self.bytes_s(now) * BITS_A_BYTE / f64::from(BAUD)
+        self.bytes_s(now) * BITS_A_BYTE
+            / f64::from(self.session.as_ref().map_or(FIRST_BAUD, |session| session.baud))
     }
 
     /// Records that were numbered and did not come.
@@ -578,6 +581,7 @@ pub(super) mod tests {
             joint_count: 12,
             period_us: 1000,
             clock_hz: 100_000_000,
+            baud: FIRST_BAUD,
             hand,
         }))
     }

@@ -8,6 +8,7 @@ use super::live::known_hand;
 use super::model::{Level, Model, News, Session};
 use crate::record::mcap::{self, About, Decoder, Entries, Entry, Recording, RecordingError, Stamp, What};
 use crate::scene::HandModel;
+use blindgrasp_shared::link::rate::FIRST_BAUD;
 use std::path::Path;
 use std::time::{Duration, Instant};
 
@@ -290,6 +291,7 @@ fn session(about: &About, hand: Option<&str>, number: Option<u16>) -> Session {
         joint_count: about.joint_count.into(),
         period_us: about.period_us,
         clock_hz: about.clock_hz,
+        baud: about.baud.unwrap_or(FIRST_BAUD),
         hand: match recorded {
             Some(hand) => Ok(Box::new(hand)),
             None => known_hand(hand, &about.hand, about.hand_hash),

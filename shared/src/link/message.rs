@@ -69,8 +69,13 @@ pub enum Request<const J: usize> {
         /// Which; 0 is the oldest.
         index: u16,
     },
-    /// End the session, and send no more records.
+    /// End the session, and send no more records. The line has its first rate once the answer has left.
     Goodbye,
+    /// Give the line another rate, once the answer has left; or: are you heard at this one? While the hand is disarmed.
+    Rate {
+        /// Which.
+        baud: u32,
+    },
 }
 
 /// Joints over the link.

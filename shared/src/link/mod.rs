@@ -41,6 +41,7 @@ mod checksum;
 mod frame;
 mod listener;
 pub mod message;
+pub mod rate;
 mod receiver;
 mod sender;
 

@@ -6,3 +6,4 @@ mod frames;
 mod line;
 mod property;
 mod random;
+mod rate;

@@ -4,6 +4,7 @@ use super::{clock, reset, wiring};
 use crate::{crash, model};
 use blindgrasp_shared::device::Device;
 use blindgrasp_shared::identity::{BrownOut, Clock, Crash, Identity, Image, ResetCause};
+use blindgrasp_shared::link::rate::FASTER_BAUDS;
 use stm32f4xx_hal::pac::{DBGMCU, FLASH, RCC};
 use stm32f4xx_hal::rcc::Rcc;
 
@@ -52,14 +53,16 @@ impl Boot {
         let image = Image::decode(image).expect("the build wrote the description");
         let &Self { clock, reset, crash, brown_out, .. } = self;
         let clock_hz = if self.is_emulated() { 0 } else { wiring::SYSTEM_CLOCK.raw() };
+        // An emulated line has no rate, and without the crystal only the slowest is sure.
+        let faster_bauds = if clock == Clock::External { &FASTER_BAUDS[..] } else { &[] };
         let told = Identity {
             reset,
             crash,
             brown_out,
             clock_hz,
-            most_baud: wiring::BAUD,
+            most_baud: faster_bauds.iter().copied().fold(wiring::BAUD, u32::max),
             ..Identity::of(image, clock)
         };
-        Device::new(model::params(), told)
+        Device::new(model::params(), told).with_faster_bauds(faster_bauds)
     }
 }

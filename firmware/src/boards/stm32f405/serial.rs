@@ -9,6 +9,7 @@
 //! raises the interrupt of an empty transmitter.)
 
 use super::wiring;
+use crate::divider::Divider;
 use crate::link::Port;
 use crate::queue::{dequeue, enqueue};
 use core::sync::atomic::{AtomicU32, Ordering};
@@ -16,6 +17,7 @@ use heapless::spsc::{Consumer, Producer, Queue};
 use stm32f4xx_hal::gpio::{PA2, PA3};
 use stm32f4xx_hal::nb;
 use stm32f4xx_hal::pac::USART2;
+use stm32f4xx_hal::pac::usart1::RegisterBlock;
 use stm32f4xx_hal::prelude::*;
 use stm32f4xx_hal::rcc::Rcc;
 use stm32f4xx_hal::serial::config::{Config, InvalidConfig};
@@ -57,7 +59,8 @@ pub fn start(
     let (tx, mut rx) = Serial::new(usart, (pins.tx, pins.rx), config, rcc)?.split();
     let (producer, consumer) = bytes.split();
     rx.listen();
-    Ok((Interrupt { rx, bytes: producer }, Line { tx, bytes: consumer }))
+    let bus_hz = rcc.clocks.pclk1().raw();
+    Ok((Interrupt { rx, bytes: producer }, Line { tx, bus_hz, bytes: consumer }))
 }
 
 /// The interrupt's end.
@@ -84,9 +87,20 @@ impl Interrupt {
     }
 }
 
+/// The registers of the USART, for what the HAL can't do once it has started.
+fn registers() -> &'static RegisterBlock {
+    // SAFETY: the line's end alone writes those that it uses, from the idle task. The interrupt reads the status and the data.
+    #[allow(unsafe_code)]
+    unsafe {
+        &*USART2::ptr()
+    }
+}
+
 /// The other end.
 pub struct Line {
     tx: Tx<USART2>,
+    /// Clock of the USART's bus, Hz.
+    bus_hz: u32,
     bytes: Consumer<'static, u8>,
 }
 
@@ -101,5 +115,20 @@ impl Port for Line {
 
     fn try_send(&mut self, byte: u8) -> bool {
         self.tx.write(byte).is_ok()
+    }
+
+    fn is_sent(&self) -> bool {
+        registers().sr().read().tc().bit_is_set()
+    }
+
+    fn set_baud(&mut self, baud: u32) {
+        // The line has no rate that the generator does not have: the tests look at each.
+        let Some(Divider { register, by_eight }) = Divider::new(self.bus_hz, baud) else { return };
+        let usart = registers();
+        usart.cr1().modify(|_, w| w.ue().disabled());
+        // SAFETY: every value of the register is a divider.
+        #[allow(unsafe_code)]
+        usart.brr().write(|w| unsafe { w.bits(register) });
+        usart.cr1().modify(|_, w| w.over8().bit(by_eight).ue().enabled());
     }
 }
