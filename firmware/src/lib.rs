@@ -3,10 +3,10 @@
 //! alone is in that board's folder ([`boards`]).
 //!
 //! ```text
-//!  priority 3   USART2 --byte--+
-//!  priority 2   SysTick, 1 kHz |   control task: joints -> tick -> joints
-//!                              |        ^ packets         | records, replies
-//!  idle                        +--> link: frames to packets, replies to frames --> USART2
+//!  priority 3   USART2 --bytes (DMA1)--+                                   bytes (DMA1) --> USART2
+//!  priority 2   SysTick, 1 kHz         |   control task: joints -> tick -> joints    ^
+//!                                      |        ^ packets         | records, replies |
+//!  idle                                +--> link: frames to packets, replies to frames
 //! ```
 //!
 //! Everything between two priorities is a bounded queue without locks ([`queue`]). Two images come of it: `hand`, with

@@ -13,15 +13,15 @@ use std::process::Command;
 use std::sync::OnceLock;
 
 /// Flash of an image, bytes.
-const MOST_FLASH: u64 = 96 * 1024;
+const MOST_FLASH: u64 = 104 * 1024;
 /// Variables of an image, without the stack, bytes.
-const MOST_RAM: u64 = 80 * 1024;
+const MOST_RAM: u64 = 72 * 1024;
 /// By how much a size may differ from the one that is written down, bytes: compilers differ, and so do the paths in the
 /// messages of panics.
 const SIZE_SLACK: u64 = 1024;
 /// The interrupts of the image `hand` that do its work.
 const CONTROL_TASK: &str = "SysTick";
-const BYTE_TASK: &str = "USART2";
+const LINE_TASKS: [&str; 3] = ["USART2", "DMA1_STREAM5", "DMA1_STREAM6"];
 
 /// ELF of an image for the default hand.
 fn elf(kind: &'static str) -> &'static [u8] {
@@ -51,8 +51,10 @@ fn sizes(elf: &[u8]) -> (u64, u64) {
 #[test]
 fn the_control_task_reaches_no_panic_and_no_double_precision() {
     let image = Image::read(elf("hand"));
-    let reached = image.reached(&[image.address(CONTROL_TASK), image.address(BYTE_TASK)]);
-    println!("functions reached from {CONTROL_TASK} and {BYTE_TASK}: {}", reached.len());
+    let mut tasks = LINE_TASKS.map(|task| image.address(task)).to_vec();
+    tasks.push(image.address(CONTROL_TASK));
+    let reached = image.reached(&tasks);
+    println!("functions reached from {CONTROL_TASK} and {LINE_TASKS:?}: {}", reached.len());
     assert!(reached.len() > 20, "too few to be true: {reached:?}");
     let names: Vec<&String> = image.functions.values().map(|function| &function.name).collect();
     assert!(names.iter().any(|name| name.contains("panicking")), "the image has panics, but by other names");
@@ -89,11 +91,12 @@ fn there_is_no_allocator_and_no_semihosting_on_a_real_board() {
 fn the_stack_is_twice_what_the_interrupts_need() {
     let image = Image::read(elf("hand"));
     let (control, way) = image.deepest(image.address(CONTROL_TASK));
-    let (byte, _) = image.deepest(image.address(BYTE_TASK));
+    // They have one priority, so that none interrupts another.
+    let line = LINE_TASKS.map(|task| image.deepest(image.address(task)).0).into_iter().max().unwrap_or(0);
     // On the way into each of the two, the processor pushes 26 words, with those of the FPU (RM 0403E B1.5.7).
-    let interrupts = control + byte + 2 * 26 * 4;
+    let interrupts = control + line + 2 * 26 * 4;
     println!("control task: {control} bytes of stack, {CONTROL_TASK} by way of {way:#?}");
-    println!("byte task: {byte}; both with what the processor pushes: {interrupts}");
+    println!("line tasks: {line}; both with what the processor pushes: {interrupts}");
     let file = object::File::parse(elf("hand")).expect("an ELF");
     let symbol = |name| file.symbols().find(|s| s.name() == Ok(name)).map(|s| s.address());
     let start = symbol("_stack_start").expect("the top of the stack");

@@ -7,7 +7,8 @@
 #[rtic::app(device = blindgrasp_firmware::board::pac, peripherals = true)]
 mod app {
     use blindgrasp_firmware::board::boot::Boot;
-    use blindgrasp_firmware::board::serial::{self, Bytes, Interrupt, Line};
+    use blindgrasp_firmware::board::dma::{Receiving, Sending};
+    use blindgrasp_firmware::board::serial::{self, Interrupt, Line};
     use blindgrasp_firmware::board::supply;
     use blindgrasp_firmware::board::{self, Buses, HandJoints};
     use blindgrasp_firmware::control::{Control, HandBurst, Timing, task};
@@ -23,6 +24,9 @@ mod app {
     #[local]
     struct Local {
         interrupt: Interrupt,
+        /// On hardware.
+        receiving: Option<Receiving>,
+        sending: Option<Sending>,
         control: Control,
         joints: HandJoints,
         queues: ControlEnd<'static>,
@@ -32,17 +36,19 @@ mod app {
         link: Link<'static, Line>,
     }
 
-    #[init(local = [bytes: Bytes = Bytes::new(), all_queues: Queues = Queues::new(), buses: Buses = Buses::new(), burst: HandBurst = HandBurst::new()])]
+    #[init(local = [all_queues: Queues = Queues::new(), buses: Buses = Buses::new(), burst: HandBurst = HandBurst::new()])]
     fn init(mut cx: init::Context) -> (Shared, Local) {
         let device = cx.device;
         supply::start(&device.PWR, &device.EXTI, &device.RCC);
         let mut boot = Boot::new(device.RCC, &device.DBGMCU, &device.FLASH);
         report::start(&boot, &IMAGE_HAND);
+        let dma = (!boot.is_emulated()).then_some(device.DMA1);
         let rcc = &mut boot.rcc;
         let (line_pins, joint_pins) = board::pins(device.GPIOA, device.GPIOB, device.GPIOC, rcc);
         let joints = board::joints(device.SPI1, device.SPI2, joint_pins, cx.local.buses, rcc);
-        let (interrupt, line) = serial::start(device.USART2, line_pins, cx.local.bytes, rcc)
+        let (interrupt, line, streams) = serial::start(device.USART2, dma, line_pins, rcc)
             .expect("the board's baud rate can be had from its clock");
+        let (receiving, sending) = streams.unzip();
         let (queues, link_end) = cx.local.all_queues.split();
         let controller = boot.device(&IMAGE_HAND);
         let period_us = controller.params().config().period_us;
@@ -52,6 +58,8 @@ mod app {
         schedule::start(&mut cx.core.SYST, period_us, boot.is_emulated());
         let local = Local {
             interrupt,
+            receiving,
+            sending,
             control: Control::new(controller, cx.local.burst),
             joints,
             queues,
@@ -66,8 +74,8 @@ mod app {
     ///
     /// - **Starts** it: SysTick, every millisecond (the period of the hand's configuration).
     /// - **Deadline**: the next start. Within it, 12 joints take about 0.36 ms on the buses (reckoned in `board`), the tick
-    ///   about 0.1 ms. Nothing but the interrupt of a received byte gets in between, which takes 3 % of the time at the
-    ///   very most.
+    ///   about 0.1 ms. Nothing but the line's interrupts get in between: some 50 cycles, once for each frame that is received
+    ///   or sent.
     /// - **Late**: the turn is finished, and the next one begins at once; starts beyond that one are lost. The next tick
     ///   is told, counts it, and makes it a fault when there are too many.
     /// - **Never ends**: nobody feeds the watchdog, and the hand is reset.
@@ -91,10 +99,26 @@ mod app {
         supply::sagged();
     }
 
-    /// A byte from the line: see [`serial`] for why this preempts the control task, and what it costs.
+    /// The line has fallen silent, or a byte had an error; emulated, a byte came.
     #[task(binds = USART2, priority = 3, local = [interrupt])]
-    fn byte(cx: byte::Context) {
+    fn line(cx: line::Context) {
         cx.local.interrupt.serve();
+    }
+
+    /// A lap of what is received. Before the control task: the next lap must not end uncounted.
+    #[task(binds = DMA1_STREAM5, priority = 3, local = [receiving])]
+    fn received(cx: received::Context) {
+        if let Some(receiving) = cx.local.receiving {
+            receiving.serve();
+        }
+    }
+
+    /// The end of a transfer that sends, or something to send. Before the control task: the line goes on during it.
+    #[task(binds = DMA1_STREAM6, priority = 3, local = [sending])]
+    fn sent(cx: sent::Context) {
+        if let Some(sending) = cx.local.sending {
+            sending.serve();
+        }
     }
 
     /// All that has time: frames, and logs.

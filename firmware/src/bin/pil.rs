@@ -17,7 +17,7 @@
 #[rtic::app(device = blindgrasp_firmware::board::pac, peripherals = true)]
 mod app {
     use blindgrasp_firmware::board::boot::Boot;
-    use blindgrasp_firmware::board::serial::{self, Bytes, Interrupt, Line};
+    use blindgrasp_firmware::board::serial::{self, Interrupt, Line};
     use blindgrasp_firmware::control::{Control, HandBurst};
     use blindgrasp_firmware::link::Port;
     use blindgrasp_firmware::model::IMAGE_PIL;
@@ -38,14 +38,15 @@ mod app {
         is_emulated: bool,
     }
 
-    #[init(local = [bytes: Bytes = Bytes::new(), burst: HandBurst = HandBurst::new()])]
+    #[init(local = [burst: HandBurst = HandBurst::new()])]
     fn init(mut cx: init::Context) -> (Shared, Local) {
         let device = cx.device;
         let mut boot = Boot::new(device.RCC, &device.DBGMCU, &device.FLASH);
         report::start(&boot, &IMAGE_PIL);
         let rcc = &mut boot.rcc;
         let (line_pins, _) = board::pins(device.GPIOA, device.GPIOB, device.GPIOC, rcc);
-        let (interrupt, line) = serial::start(device.USART2, line_pins, cx.local.bytes, rcc)
+        // Nothing here keeps the line waiting, so it needs no DMA.
+        let (interrupt, line, _) = serial::start(device.USART2, None, line_pins, rcc)
             .expect("the board's baud rate can be had from its clock");
         schedule::start_cycle_counter(&mut cx.core.DCB, &mut cx.core.DWT);
         let (control, is_emulated) =
@@ -104,8 +105,9 @@ mod app {
         }
 
         fn send(&mut self, bytes: &[u8]) -> Option<()> {
-            for &byte in bytes {
-                while !self.0.try_send(byte) {}
+            let mut rest = bytes;
+            while !rest.is_empty() {
+                rest = rest.get(self.0.send(rest)..)?;
             }
             Some(())
         }

@@ -43,6 +43,7 @@ mod listener;
 pub mod message;
 pub mod rate;
 mod receiver;
+pub mod ring;
 mod sender;
 
 pub use frame::{encode, most_bytes};
