@@ -10,7 +10,7 @@ A port is a serial port or pseudo-terminal (1 Mbaud), `unix:PATH` (a socket) or 
 read from first). Numbers of sections are those of docs/protocol.md. Results are on the standard output, everything else on
 the standard error. Exit codes: 0 done; 1 refused, a fault, no answer; 2 bad input or usage.
 
-It is also a module: Frames (section 1), the message types (sections 2 to 4), Replies (with dense records, section 6) and
+It is also a module: Frames (section 1), the message types (sections 2 to 4), the replies (section 6) and
 Session (section 5) stand on their own, each on those before it.
 """
 
@@ -323,7 +323,7 @@ U16, U32, I32 = Unsigned(16), Unsigned(32), Signed(32)
 
 # --------------------------------------------------------------------------------------------------- 3. Vocabulary
 
-COUNTS, TORQUES, LIMITING, DENSE, STATE = 1, 2, 4, 8, 16  # signals
+COUNTS, TORQUES, LIMITING, INPUTS, STATE = 1, 2, 4, 8, 16  # signals
 
 # ----------------------------------------------------------------------------------------------------- 4. Messages
 
@@ -345,6 +345,7 @@ COMMAND = Enum(
     Stop=None,
     ClearFault=None,
 )
+ANSWER = Option(Struct(command=COMMAND, refused=Option(REFUSAL)))
 PACKET = Struct(
     session=U16,
     sequence=U16,
@@ -376,6 +377,15 @@ FIELDS = {
     "List<Limiting, J>": List(BYTE),
 }
 RECORD = Struct(**{name: FIELDS[kind] for name, kind in RECORD_FIELDS})
+INPUT = Struct(
+    sequence=U32,
+    tick=U32,
+    answer=ANSWER,
+    events=BYTE,
+    reading_failed=Option(FAULT),
+    counts=List(I32),
+    digest=U32,
+)
 IDENTITY = Struct(
     image=Struct(
         interface_version=U16,
@@ -410,9 +420,24 @@ REPLY = Enum(
     Record=RECORD,
     Burst=Struct(sequence=U16, index=U16, count=U16, record=RECORD),
     Snapshot=Struct(tick=U32, offset=U16, length=U16, bytes=List(BYTE)),
+    Input=INPUT,
 )
 # What every version begins an identity with.
 ANY_IDENTITY = Struct(reply=Known([0]), sequence=U16, session=U16, interface_version=U16)
+
+
+# Law and ledger.
+MONITORS = [
+    "force_n",
+    "attitude_stiffness_nm",
+    "integral_gain_nm_rad",
+    "approach_potential_j",
+    "attitude_potential_j",
+    "integral_potential_j",
+    "work_j",
+    "damped_j",
+    "excess_j",
+]
 
 
 class Refused(Trouble):
@@ -431,16 +456,7 @@ def told_fault(raised):
     return f"fault {raised['fault']}: {joint}{FAULTS[raised['fault']]}"
 
 
-# ----------------------------------------------------------------------------------------- 6. Replies, dense records
-
-
-class Unusable(Exception):
-    """NoFullRecord: a dense record before a full one. Lost: more was lost than a dense record can make up for."""
-
-
-DENSE_TAG = 6
-WINDOW = 8  # a dense record can be read after any of so many before it
-# Law and ledger, as places in a record.
+# What of a record is told by numbers, as places in it: laws and ledger.
 MONITORS = [
     (field, law, k)
     for field, names in [("gains", GAINS), ("potentials_j", GAINS), ("law_signals", LAW_SIGNALS)]
@@ -453,140 +469,6 @@ def at(record, path):
     for step in path:
         record = record[step]
     return record
-
-
-# Of each, the bit that says that it follows: stiffness and integral gain share one.
-FOLLOWS = [1, 2, 2, 4, 8, 16, 32, 64, 128]
-
-
-def half_bits(value):
-    """The bits of a number as a binary16."""
-    try:
-        return int.from_bytes(struct.pack("<e", value), "little")
-    except OverflowError:
-        return 0x7C00 if value > 0 else 0xFC00
-
-
-def rounded(value):
-    """A number as a binary16 has it."""
-    return struct.unpack("<e", half_bits(value).to_bytes(2, "little"))[0]
-
-
-def mix(words):
-    """The hash of dense records."""
-    value = 0
-    for word in words:
-        value = ((value << 5 | value >> 27) & 0xFFFFFFFF ^ word & 0xFFFFFFFF) * 0x9E3779B9 & 0xFFFFFFFF
-    return value
-
-
-def not_below(last, low, bits):
-    """The least number that is not below `last` and has these low bits, modulo 2^32."""
-    return (last + (low - last) % (1 << bits)) % 2**32
-
-
-def nearest(last, low, bits):
-    """The number nearest to `last` with these low bits, in 32 bits with a sign."""
-    half = 1 << (bits - 1)
-    return (last + (low - last + half) % (1 << bits) - half + 2**31) % 2**32 - 2**31
-
-
-def nibbles(packed, size, count):
-    """Numbers of `size` half bytes, the lowest first."""
-    whole = int.from_bytes(packed, "little")
-    return [whole >> 4 * size * k & (1 << 4 * size) - 1 for k in range(count)]
-
-
-class Replies:
-    """Payloads to replies; dense records come out as records."""
-
-    def __init__(self):
-        self.last = None  # the record before
-        self.counts = (0, [])  # the last ones known, and in which record they were
-        self.lost = False  # only a full record helps
-
-    def decode(self, payload):
-        """A reply, and the digest of a dense record (None for all others)."""
-        if payload[:1] == bytes([DENSE_TAG]):
-            record, digest = self.dense(Reader(payload[1:]))
-            return {"Record": record}, digest
-        reply = REPLY.decode(payload)
-        if "Record" in reply:
-            self.take(reply["Record"])
-            self.lost = False
-        return reply, None
-
-    def take(self, record):
-        self.last = record
-        if record["counts"]:
-            self.counts = record["sequence"], record["counts"]
-
-    def dense(self, body):
-        """What goes on from the record before; see "Decoding" in section 6."""
-        if self.last is None:
-            raise Unusable("NoFullRecord")
-        if self.lost:
-            raise Unusable("Lost")
-        last, half = self.last, Fixed("e")
-        sequence, tick, state, parts, cycles, late = struct.unpack("<BHBBHB", body.take(8))
-        mode, events, size = state & 7, state >> 3, parts & 15
-        if state >> 6 or mode >= len(MODES) or size > 8:
-            raise Malformed("a dense record with unknown bits")
-        sequence = not_below(last["sequence"], sequence, 8)
-        passed = (sequence - last["sequence"]) % 2**32
-        whole_tick = (last["tick"] + passed * last["decimation"]) % 2**32
-        counted_at, counts = self.counts
-        far = size and (sequence - counted_at) % 2**32 > WINDOW
-        if not 1 <= passed <= WINDOW or tick != whole_tick % 2**16 or far:
-            self.lost = True
-            raise Unusable("Lost")
-        follow = BYTE.read(body)
-        monitors = [
-            half.read(body) if follow & bit else rounded(at(last, path)) for path, bit in zip(MONITORS, FOLLOWS)
-        ]
-        record = {
-            "sequence": sequence,
-            "tick": whole_tick,
-            "mode": MODES[mode],
-            "fault": None,
-            "answer": None,
-            "events": events,
-            "reading_failed": None,
-            "gains": {law: list(values) for law, values in last["gains"].items()},
-            "potentials_j": {law: list(values) for law, values in last["potentials_j"].items()},
-            "law_signals": {law: list(values) for law, values in last["law_signals"].items()},
-            "cycles": 4 * cycles,
-            "late_ticks": not_below(last["late_ticks"], late & 15, 4),
-            "dropped": not_below(last["dropped"], late >> 4, 4),
-            "decimation": last["decimation"],
-            "counts": [],
-            "torques_nm": [],
-            "limiting": [0] * len(last["limiting"]),
-        }
-        for (*path, last_step), value in zip(MONITORS, monitors):
-            at(record, path)[last_step] = value
-        for bit, part in [(16, "fault"), (32, "reading_failed")]:
-            if parts & bit:
-                fault, joint = Known(FAULTS).read(body), BYTE.read(body)
-                record[part] = {"fault": fault, "joint": None if joint == 255 else joint}
-        if size:
-            low = nibbles(body.take((len(counts) * size + 1) // 2), size, len(counts))
-            record["counts"] = [nearest(*count, 4 * size) for count in zip(counts, low)]
-        if parts & 64:
-            record["torques_nm"] = [half.read(body) for _ in last["torques_nm"]]
-        if parts & 128:
-            joints = len(last["limiting"])
-            record["limiting"] = nibbles(body.take((joints + 1) // 2), 1, joints)
-        check, digest = struct.unpack("<BH", body.take(3))
-        if body.at < len(body.data):
-            raise Malformed("there are bytes after the record")
-        numbers = [record[part] for part in ("sequence", "tick", "late_ticks", "dropped", "decimation")]
-        law = [half_bits(value) for value in monitors]
-        if mix(numbers + law + record["counts"]) >> 24 != check:
-            self.lost = True
-            raise Unusable("Lost")
-        self.take(record)
-        return record, digest
 
 
 # ------------------------------------------------------------------------------------------------------- The lines
@@ -688,12 +570,12 @@ class Session:
 
     def __init__(self, line, on_record=lambda record: None):
         self.line, self.on_record = line, on_record
-        self.frames, self.replies = Frames(), Replies()
+        self.frames = Frames()
         self.number, self.sequence, self.identity = 0, 0, None
         self.waiting = set()  # numbers of heartbeats without an answer
         self.next_heartbeat = None
-        self.records, self.dense, self.lost, self.unusable, self.malformed = 0, 0, 0, 0, 0
-        self.last_record, self.snapshots, self.parts = None, 0, {}
+        self.records, self.inputs, self.lost, self.malformed = 0, 0, 0, 0
+        self.last_sequence, self.last_record, self.snapshots, self.parts = None, None, 0, {}
         line.write(b"\0")  # ends whatever is on the line
 
     def send(self, request):
@@ -709,11 +591,7 @@ class Session:
         heard = []
         for payload in self.frames.push(self.line.read(patience_s)):
             try:
-                reply, digest = self.replies.decode(payload)
-                self.dense += digest is not None
-            except Unusable:
-                self.unusable += 1
-                continue
+                reply = REPLY.decode(payload)
             except Malformed:
                 heard.append({"Malformed": payload})
                 self.malformed += 1
@@ -721,6 +599,9 @@ class Session:
             (kind, body), = reply.items()
             if kind == "Record":
                 self.take(body)
+            elif kind == "Input":
+                self.inputs += 1
+                self.number_of(body)
             elif kind == "Snapshot":
                 self.collect(body)
             elif kind == "Answer" and body["sequence"] in self.waiting:
@@ -732,11 +613,16 @@ class Session:
         return heard
 
     def take(self, record):
-        if self.last_record is not None:
-            self.lost += (record["sequence"] - self.last_record["sequence"] - 1) % 2**32
+        self.number_of(record)
         self.records += 1
         self.last_record = record
         self.on_record(record)
+
+    def number_of(self, told):
+        """What is missing before a record or an input record was lost."""
+        if self.last_sequence is not None:
+            self.lost += (told["sequence"] - self.last_sequence - 1) % 2**32
+        self.last_sequence = told["sequence"]
 
     def collect(self, part):
         """Parts of a snapshot of the state: bytes to keep, not to look into."""
@@ -819,15 +705,14 @@ class Session:
 
     def telemetry(self, decimation, signals):
         # Records of before do not count as lost.
-        self.last_record = None
+        self.last_sequence = None
         return self.ask({"Telemetry": {"decimation": decimation, "signals": signals}})
 
     def counted(self):
         return {
             "records": self.records,
-            "dense": self.dense,
+            "inputs": self.inputs,
             "lost": self.lost,
-            "unusable": self.unusable,
             "damaged": self.frames.damaged,
             "malformed": self.malformed,
             "snapshots": self.snapshots,
@@ -1156,15 +1041,6 @@ def self_test(path, out):
         except Malformed:
             why = "malformed"
         check(told, vector["name"], why, "malformed")
-    for stream in vectors["streams"]:
-        replies = Replies()
-        for number, step in enumerate(stream["steps"]):
-            try:
-                reply, digest = replies.decode(bytes.fromhex(step["payload"]))
-                got = {"record": single(reply["Record"]), "digest": digest}
-            except Unusable as reason:
-                got = str(reason)
-            check(told, f"{stream['name']}, step {number}", got, single(step["heard"]))
     counts = ", ".join(f"{len(part)} {name}" for name, part in vectors.items() if isinstance(part, list))
     if told:
         raise Trouble("\n".join(told))
@@ -1184,9 +1060,10 @@ def arguments():
         if telemetry:
             added.add_argument("--csv", action="store_true", help="each record as a line of CSV")
             added.add_argument("--decimation", type=int, default=1, help="one record in so many ticks")
-            full = ["--full", "dest=signals", "records in their full form, not the dense one"]
-            added.add_argument(full[0], dest="signals", action="store_const", help=full[2],
-                               const=COUNTS | TORQUES | LIMITING, default=COUNTS | TORQUES | LIMITING | DENSE | STATE)
+            added.add_argument("--all", dest="signals", action="store_const",
+                               help="also an input record a tick where there is no full one, and the state",
+                               default=COUNTS | TORQUES | LIMITING,
+                               const=COUNTS | TORQUES | LIMITING | INPUTS | STATE)
         return added
 
     command("info", "who the hand is")

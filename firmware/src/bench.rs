@@ -17,11 +17,10 @@ use blindgrasp_shared::control::{Latch, LawsConfig, Stance};
 use blindgrasp_shared::device::Reading;
 use blindgrasp_shared::fault::Raised;
 use blindgrasp_shared::hand::Posture;
-use blindgrasp_shared::link::Sender;
-use blindgrasp_shared::link::message::{Packet, Reply, Request, Signals};
+use blindgrasp_shared::link::encode;
+use blindgrasp_shared::link::message::{Form, Packet, Reply, Request, Signals};
 use blindgrasp_shared::supervisor::Mode;
 use blindgrasp_shared::telemetry::INTERFACE_VERSION;
-use blindgrasp_shared::telemetry::dense::TAG;
 use blindgrasp_shared::telemetry::snapshot::BYTES_PER_JOINT;
 use blindgrasp_shared::tick::Params;
 use core::fmt::Write;
@@ -79,10 +78,10 @@ struct Figures {
     law_gravity_on: u32,
     tick: u32,
     encode_full: u32,
-    encode_dense: u32,
+    encode_input: u32,
     save: u32,
     full_bytes: usize,
-    dense_bytes: usize,
+    input_bytes: usize,
     snapshot_bytes: usize,
 }
 
@@ -171,7 +170,6 @@ fn whole_tick(
     // From hello to full force: the soft start takes as long as it takes.
     let settle = 20 + params.config().supervisor.soft_start_ms as usize;
     let mut joints = Swinging { params, tick: 0 };
-    let mut sender = Sender::new();
     let mut session = 0;
     for tick in 0..settle + TICKS {
         let request = match tick {
@@ -184,7 +182,7 @@ fn whole_tick(
         let packet = Packet { session, sequence: tick as u16, request };
         let mut outputs = None;
         let instructions = counter.instructions(|| {
-            outputs = Some(control.turn(black_box(&mut joints), Some(packet), Timing::default(), 0));
+            outputs = Some(control.turn(black_box(&mut joints), Some(packet), Timing::default(), 0, 0));
         });
         // What making up the joints took is not the tick's.
         let idle = counter.instructions(|| {
@@ -204,22 +202,19 @@ fn whole_tick(
             return Err("the hand does not grasp");
         }
         figures.tick = figures.tick.max(instructions.saturating_sub(idle));
-        let Some(signals) = outputs.telemetry else { return Err("there was no record") };
-        let mut buffer = [0; MOST_SENT];
-        let mut length = 0;
-        // One after the other, as they are sent: one in a hundred is full.
-        let instructions = counter.instructions(|| {
-            let frame = sender.record(black_box(&outputs.record), signals, black_box(&mut buffer));
-            length = frame.map_or(0, <[u8]>::len);
-        });
-        // The first byte of the payload, behind the code of its block.
-        let (most, bytes) = if buffer.get(1) == Some(&TAG) {
-            (&mut figures.encode_dense, &mut figures.dense_bytes)
-        } else {
-            (&mut figures.encode_full, &mut figures.full_bytes)
-        };
-        *most = instructions.max(*most);
-        *bytes = length.max(*bytes);
+        for (form, most, bytes) in [
+            (Form::Full(Signals::ALL), &mut figures.encode_full, &mut figures.full_bytes),
+            (Form::Input, &mut figures.encode_input, &mut figures.input_bytes),
+        ] {
+            let (record, mut buffer) = (outputs.record.clone(), [0; MOST_SENT]);
+            let mut length = 0;
+            let instructions = counter.instructions(|| {
+                let frame = encode(&form.of(black_box(record)), black_box(&mut buffer));
+                length = frame.map_or(0, <[u8]>::len);
+            });
+            *most = instructions.max(*most);
+            *bytes = length.max(*bytes);
+        }
         let mut buffer = [0; SNAPSHOT_MOST];
         let mut length = 0;
         let instructions = counter.instructions(|| {
@@ -233,14 +228,14 @@ fn whole_tick(
 }
 
 fn print(figures: &Figures) -> Result<(), &'static str> {
-    let &Figures { law_gravity_off, law_gravity_on, tick, encode_full, encode_dense, save, .. } = figures;
-    let &Figures { full_bytes, dense_bytes, snapshot_bytes, .. } = figures;
+    let &Figures { law_gravity_off, law_gravity_on, tick, encode_full, encode_input, save, .. } = figures;
+    let &Figures { full_bytes, input_bytes, snapshot_bytes, .. } = figures;
     let mut json = String::<384>::new();
     writeln!(
         json,
         "{{\"law_gravity_off\": {law_gravity_off}, \"law_gravity_on\": {law_gravity_on}, \"tick\": {tick}, \
-         \"encode_full\": {encode_full}, \"encode_dense\": {encode_dense}, \"save\": {save}, \
-         \"full_bytes\": {full_bytes}, \"dense_bytes\": {dense_bytes}, \"snapshot_bytes\": {snapshot_bytes}}}"
+         \"encode_full\": {encode_full}, \"encode_input\": {encode_input}, \"save\": {save}, \
+         \"full_bytes\": {full_bytes}, \"input_bytes\": {input_bytes}, \"snapshot_bytes\": {snapshot_bytes}}}"
     )
     .map_err(|_| "the figures are too long")?;
     let mut output = File::standard_output().ok_or("there is no standard output")?;

@@ -44,12 +44,12 @@ pub fn task(
     let turn = Turn::begin();
     let packet = queues.take();
     let last = Timing { supply_low: supply::take(), ..last };
-    let outputs = control.turn(joints, packet, last, queues.dropped());
+    let outputs = control.turn(joints, packet, last, queues.dropped(), queues.waiting());
     if let Some(reply) = outputs.reply {
         queues.answer(queue::Answer { reply, baud: outputs.baud });
     }
-    if let Some(signals) = outputs.telemetry {
-        queues.tell(Telemetry::Record(outputs.record, signals));
+    if let Some(form) = outputs.telemetry {
+        queues.tell(Telemetry::Record(outputs.record, form));
     }
     if let Some(part) = outputs.part {
         queues.tell(Telemetry::Part(part));
@@ -85,11 +85,12 @@ impl Control {
         packet: Option<HandPacket>,
         last: Timing,
         dropped: u32,
+        waiting: usize,
     ) -> Outputs<JOINTS> {
         let read = joints.read();
         let reading = self.failed.take().map_or(read, Reading::Failed);
         let Timing { late, supply_low, cycles } = last;
-        let inputs = Inputs { reading, late, supply_low, cycles, dropped, packet };
+        let inputs = Inputs { reading, late, supply_low, cycles, dropped, waiting, packet };
         let outputs = self.device.tick(&inputs, self.burst);
         if outputs.record.answer == Some(CLEARED) {
             joints.recover();

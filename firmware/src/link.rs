@@ -1,12 +1,12 @@
 //! Between the line and the control task: frames to packets, replies to frames. Runs when nothing else does.
 
 use crate::model::JOINTS;
-use crate::queue::{Answer, HandPacket, HandReply, LinkEnd, Telemetry};
+use crate::queue::{Answer, HandPacket, HandReply, LinkEnd};
 use blindgrasp_shared::command::Refusal;
 use blindgrasp_shared::link::message::{Packet, Reply, Request, not_understood};
 use blindgrasp_shared::link::rate::{FIRST_BAUD, HandRate};
 use blindgrasp_shared::link::ring::{ReceiveRing, SendRing};
-use blindgrasp_shared::link::{Counters, Receiver, Sender, most_bytes};
+use blindgrasp_shared::link::{Counters, Receiver, encode, most_bytes};
 use heapless::Deque;
 
 /// Bytes of the longest payload that is received, with its CRC.
@@ -83,7 +83,6 @@ pub struct Link<'q, P> {
     queues: LinkEnd<'q>,
     /// Requests that do not get to the control task: their numbers, and why not.
     refusals: Deque<(u16, Refusal), REFUSALS>,
-    sender: Sender<JOINTS>,
     /// The frame that is being sent, what of it is sent, and its length.
     frame: [u8; MOST_SENT],
     sent: usize,
@@ -103,7 +102,6 @@ impl<'q, P: Port> Link<'q, P> {
             frames: Frames::new(),
             queues,
             refusals: Deque::new(),
-            sender: Sender::new(),
             frame: [0; MOST_SENT],
             sent: 0,
             length: 0,
@@ -147,24 +145,17 @@ impl<'q, P: Port> Link<'q, P> {
             let _ = self.refusals.push_back(refusal);
         }
         if self.sent == self.length && self.next_baud.is_none() {
-            // Who waits for an answer has done his part; a refusal can wait.
-            let (sender, buffer) = (&mut self.sender, &mut self.frame);
+            // Who waits for an answer has done his part; a refusal can wait; telemetry goes last.
             let refusal =
                 || self.refusals.pop_front().map(|(sequence, reason)| refused(sequence, reason).into());
-            let frame = match self.queues.answer().or_else(refusal) {
-                Some(Answer { reply, baud }) => {
-                    self.next_baud = baud;
-                    sender.reply(&reply, buffer)
-                }
-                None => match self.queues.telemetry() {
-                    Some(Telemetry::Record(record, signals)) => sender.record(&record, signals, buffer),
-                    Some(Telemetry::Part(part)) => sender.reply(&Reply::Snapshot(part), buffer),
-                    None => Ok(&[][..]),
-                },
-            };
-            // The buffer has room for the longest reply, so this can't fail.
-            self.length = frame.map_or(0, <[u8]>::len);
-            self.sent = 0;
+            let next = self.queues.answer().or_else(refusal);
+            let next = next.or_else(|| self.queues.telemetry().map(Answer::from));
+            if let Some(Answer { reply, baud }) = next {
+                self.next_baud = baud;
+                // The buffer has room for the longest reply, so this can't fail.
+                self.length = encode(&reply, &mut self.frame).map_or(0, <[u8]>::len);
+                self.sent = 0;
+            }
         }
         if let Some(rest) = self.frame.get(self.sent..self.length) {
             self.sent += self.port.send(rest);
@@ -194,7 +185,7 @@ pub fn refused(sequence: u16, reason: Refusal) -> HandReply {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::queue::Queues;
+    use crate::queue::{Queues, Telemetry};
     use blindgrasp_shared::command::Command;
     use blindgrasp_shared::link::encode;
     use blindgrasp_shared::link::rate::TRIAL_MS;

@@ -92,7 +92,7 @@ impl<'c, W: Way> Lockstep<'c, W> {
         let packet = self.waiting.pop_front();
         let last = Timing { late: sample.late, supply_low: false, cycles: self.cycles };
         let began = (self.cycle_count)();
-        let outputs = self.control.turn(&mut Remote(sample), packet, last, 0);
+        let outputs = self.control.turn(&mut Remote(sample), packet, last, 0, 0);
         self.cycles = (self.cycle_count)().wrapping_sub(began);
         let record = Reply::Record(outputs.record);
         match &outputs.reply {

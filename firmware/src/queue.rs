@@ -6,8 +6,9 @@
 
 use crate::model::JOINTS;
 use blindgrasp_shared::command::Command;
+use blindgrasp_shared::device::WAITING_MOST;
 use blindgrasp_shared::link::may_take;
-use blindgrasp_shared::link::message::{Packet, Reply, Request, Signals};
+use blindgrasp_shared::link::message::{Form, Packet, Reply, Request};
 use blindgrasp_shared::telemetry::Record;
 use blindgrasp_shared::telemetry::snapshot::Part;
 use heapless::spsc::{Consumer, Producer, Queue};
@@ -33,10 +34,20 @@ impl From<HandReply> for Answer {
 
 /// What the hand tells by itself.
 pub enum Telemetry {
-    /// What a tick did, and what of it is to be sent.
-    Record(Record<JOINTS>, Signals),
+    /// What a tick did, and how that is told.
+    Record(Record<JOINTS>, Form),
     /// A part of a snapshot.
     Part(Part),
+}
+
+impl Telemetry {
+    /// As it is sent. Only the link makes it: the digest of an input record takes time that the control task has not.
+    fn reply(self) -> HandReply {
+        match self {
+            Self::Record(record, form) => form.of(record),
+            Self::Part(part) => Reply::Snapshot(part),
+        }
+    }
 }
 
 /// Packets that wait for a tick; the control task takes one a millisecond. A queue holds one less than its size.
@@ -44,7 +55,7 @@ const PACKETS: usize = 8;
 /// Answers that wait for the line. They go before telemetry.
 const ANSWERS: usize = 8;
 /// Records and parts of snapshots that wait for the line.
-const RECORDS: usize = 8;
+const RECORDS: usize = WAITING_MOST + 1;
 /// A second stop before the first is acted on says nothing new.
 const STOPS: usize = 2;
 
@@ -110,6 +121,11 @@ impl ControlEnd<'_> {
         self.dropped = self.dropped.saturating_add(u32::from(lost));
     }
 
+    /// How many records and parts wait for the line.
+    pub fn waiting(&self) -> usize {
+        if is_nothing(self.records.capacity()) { 0 } else { self.records.len() }
+    }
+
     /// How many records and parts were dropped so far.
     pub fn dropped(&self) -> u32 {
         self.dropped
@@ -143,8 +159,8 @@ impl LinkEnd<'_> {
     }
 
     /// The next telemetry to send.
-    pub fn telemetry(&mut self) -> Option<Telemetry> {
-        dequeue(&mut self.records)
+    pub fn telemetry(&mut self) -> Option<HandReply> {
+        dequeue(&mut self.records).map(Telemetry::reply)
     }
 
     /// Whether nothing waits to be sent.
@@ -211,10 +227,11 @@ mod tests {
             supply_low: false,
             cycles: 0,
             dropped: 0,
+            waiting: 0,
             packet: None,
         };
         let mut burst = Box::new(Burst::new());
-        Telemetry::Record(Device::new(hand, identity).tick(&inputs, &mut burst).record, Signals::ALL)
+        Telemetry::Record(Device::new(hand, identity).tick(&inputs, &mut burst).record, Form::Input)
     }
 
     #[test]
@@ -224,7 +241,7 @@ mod tests {
         for _ in 0..RECORDS + 2 {
             control.tell(record());
         }
-        assert_eq!(control.dropped(), 3);
+        assert_eq!((control.dropped(), control.waiting()), (3, RECORDS - 1));
         for sequence in 0..ANSWERS as u16 - 1 {
             control.answer(Reply::Answer { sequence, refused: None }.into());
         }
@@ -234,7 +251,7 @@ mod tests {
             assert!(matches!(reply, Some(Reply::Answer { sequence, .. }) if sequence == expected));
         }
         for _ in 0..RECORDS - 1 {
-            assert!(!link.is_empty() && link.telemetry().is_some());
+            assert!(!link.is_empty() && matches!(link.telemetry(), Some(Reply::Input(_))));
         }
         assert!(link.is_empty());
     }

@@ -68,7 +68,7 @@ impl Bench {
     }
 
     fn turn(&mut self, packet: Option<Packet<JOINTS>>) -> Outputs<JOINTS> {
-        self.control.turn(&mut self.joints, packet, Timing::default(), 0)
+        self.control.turn(&mut self.joints, packet, Timing::default(), 0, 0)
     }
 
     fn turns(&mut self, count: usize) -> Outputs<JOINTS> {
@@ -178,7 +178,7 @@ fn the_amplifiers_have_power_only_while_there_may_be_torque() {
     expect(&mut bench, Request::Command(Command::Arm), Mode::Armed);
     // The supply sags.
     let sagged = Timing { supply_low: true, ..Timing::default() };
-    let outputs = bench.control.turn(&mut bench.joints, None, sagged, 0);
+    let outputs = bench.control.turn(&mut bench.joints, None, sagged, 0, 0);
     assert_eq!(outputs.record.fault, Some(Raised::of_hand(Fault::SupplyLow)));
     assert!(!bench.enable.high.get());
     assert_eq!(bench.clear(session).1, None);

@@ -10,13 +10,12 @@ use blindgrasp_shared::estimate::{Encoder, EstimatorConfig};
 use blindgrasp_shared::fault::FaultConfig;
 use blindgrasp_shared::hand::{Hand, Posture as PostureOf};
 use blindgrasp_shared::limit::LimitConfig;
-use blindgrasp_shared::link::message::Signals;
-use blindgrasp_shared::link::{Listener, Receiver, Sender};
+use blindgrasp_shared::link::encode;
+use blindgrasp_shared::link::message::{Form, Reply, Signals};
 use blindgrasp_shared::supervisor::SupervisorConfig;
 use blindgrasp_shared::telemetry::Record;
-use blindgrasp_shared::telemetry::dense::FULL_EVERY_TICKS;
 use blindgrasp_shared::tick::{Config, Input, Params, State, tick};
-use criterion::{BatchSize, Criterion, Throughput, criterion_group, criterion_main};
+use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use nalgebra::Vector3;
 use std::f64::consts::TAU;
 use std::hint::black_box;
@@ -92,59 +91,28 @@ fn controller(criterion: &mut Criterion) {
     });
     let mut buffer = [0; 512];
     let record = tick(&params, &mut state, &Input::counts(&counts, None)).record;
-    dense(criterion, &record);
+    told(criterion, &record);
     criterion.bench_function("encode a record (12 joints)", |bencher| {
         bencher.iter(|| black_box(&record).encode(&mut buffer).map(|bytes| bytes.len()));
     });
 }
 
-/// The dense form of records that follow one another, and what is made of it again.
-fn dense(criterion: &mut Criterion, record: &Record<J>) {
+/// A record as it goes out, in full and as the input record that stands in for it, and back.
+fn told(criterion: &mut Criterion, record: &Record<J>) {
     let mut buffer = [0; 512];
-    let mut sender = Sender::new();
-    // A full one first: what is dense goes on from it. Then as many as go out before the next full one.
-    let mut records = Vec::new();
-    let mut payloads = Vec::new();
-    for tick in 0..FULL_EVERY_TICKS {
-        let record = Record { sequence: tick, tick, answer: None, ..record.clone() };
-        let frame = sender.record(&record, Signals::FULL, &mut buffer).expect("room");
-        let mut receiver = Receiver::<512>::new();
-        let payload = frame.iter().fold(None, |payload, &byte| {
-            receiver.push(byte).map(|received| received.expect("a good frame").to_vec()).or(payload)
+    let mut group = criterion.benchmark_group("told");
+    for (name, form) in [("full", Form::Full(Signals::ALL)), ("input", Form::Input)] {
+        group.bench_function(format!("encode {name}"), |bencher| {
+            bencher.iter(|| {
+                let frame = encode(&form.of(black_box(record).clone()), &mut buffer);
+                frame.map_or(0, <[u8]>::len)
+            });
         });
-        records.push(record);
-        payloads.push(payload.expect("a payload"));
+        let payload = postcard::to_allocvec(&form.of(record.clone())).expect("a payload");
+        group.bench_function(format!("decode {name}"), |bencher| {
+            bencher.iter(|| black_box(Reply::<MAX_JOINTS>::decode(black_box(&payload)).expect("a reply")));
+        });
     }
-    let dense = records.len() as u64 - 1;
-    let mut group = criterion.benchmark_group("dense");
-    group.throughput(Throughput::Elements(dense));
-    let mut begun = Sender::new();
-    begun.record(&records[0], Signals::FULL, &mut buffer).expect("room");
-    group.bench_function("encode dense", |bencher| {
-        bencher.iter_batched_ref(
-            || begun.clone(),
-            |sender| {
-                for record in &records[1..] {
-                    let frame = sender.record(black_box(record), Signals::FULL, &mut buffer);
-                    black_box(frame.map_or(0, <[u8]>::len));
-                }
-            },
-            BatchSize::SmallInput,
-        );
-    });
-    let mut begun = Listener::<MAX_JOINTS>::new();
-    begun.hear(&payloads[0]).expect("a full record");
-    group.bench_function("decode dense", |bencher| {
-        bencher.iter_batched_ref(
-            || begun.clone(),
-            |listener| {
-                for payload in &payloads[1..] {
-                    black_box(listener.hear(black_box(payload)).expect("a dense record"));
-                }
-            },
-            BatchSize::SmallInput,
-        );
-    });
     group.finish();
 }
 

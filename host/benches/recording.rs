@@ -7,15 +7,12 @@ use blindgrasp::record::mcap::{Decoder, Entry, Recording, What, Writer};
 use blindgrasp::scene::Scene;
 use blindgrasp::sim::Simulation;
 use blindgrasp::sim::recorder::Recorder;
-use blindgrasp_shared::link::message::{Reply, Signals};
-use blindgrasp_shared::link::{Receiver, Sender};
+use blindgrasp_shared::link::message::{Form, Reply};
 use criterion::{BatchSize, Criterion, Throughput, criterion_group, criterion_main};
 use std::path::Path;
 
-const FRAME: usize = Reply::<MAX_JOINTS>::MOST_BYTES + 16;
-
-/// What a hand says while it grasps a cube for so long, as full records or dense ones; what comes before them comes too.
-fn said(folder: &Path, duration_s: f64, dense: bool) -> Vec<Entry> {
+/// What a hand says while it grasps a cube for so long, as full records or input records; what comes before them comes too.
+fn said(folder: &Path, duration_s: f64, inputs: bool) -> Vec<Entry> {
     let scene = Scene::load("cube", &[format!("duration_s={duration_s:?}")]).unwrap();
     let path = folder.join("source.mcap");
     let simulation = Simulation::new(&scene).unwrap();
@@ -25,18 +22,10 @@ fn said(folder: &Path, duration_s: f64, dense: bool) -> Vec<Entry> {
     let mut entries: Vec<Entry> =
         Recording::open(&path).unwrap().entries().unwrap().map(Result::unwrap).collect();
     entries.retain(|entry| !matches!(entry.what, What::Event { .. }));
-    let mut sender = Sender::<MAX_JOINTS>::new();
     for entry in &mut entries {
         let What::Received(payload) = &mut entry.what else { continue };
-        if let (true, Ok(Reply::Record(record))) = (dense, Reply::<MAX_JOINTS>::decode(payload)) {
-            let mut buffer = [0; FRAME];
-            let frame = sender.record(&record, Signals::FULL, &mut buffer).unwrap();
-            let mut receiver = Receiver::<FRAME>::new();
-            for &byte in frame {
-                if let Some(heard) = receiver.push(byte) {
-                    *payload = heard.unwrap().to_vec();
-                }
-            }
+        if let (true, Ok(Reply::Record(record))) = (inputs, Reply::<MAX_JOINTS>::decode(payload)) {
+            *payload = postcard::to_allocvec(&Form::Input.of(record)).unwrap();
         }
     }
     entries
@@ -60,8 +49,8 @@ fn write(path: &Path, entries: &[Entry]) -> u64 {
 
 fn recording(criterion: &mut Criterion) {
     let folder = tempfile::tempdir().unwrap();
-    for (name, dense) in [("full", false), ("dense", true)] {
-        let entries = said(folder.path(), 5.0, dense);
+    for (name, inputs) in [("full", false), ("input", true)] {
+        let entries = said(folder.path(), 5.0, inputs);
         let records = entries.iter().filter(|entry| matches!(entry.what, What::Received(_))).count() as u64;
         let path = folder.path().join("a.mcap");
         let bytes = write(&path, &entries);

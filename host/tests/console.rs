@@ -93,7 +93,7 @@ impl Board {
         let packet = self.waiting.pop_front();
         let reading = self.reading;
         let outputs = self.device.tick(
-            &Inputs { reading, late: false, supply_low: false, cycles: 7, dropped: 0, packet },
+            &Inputs { reading, late: false, supply_low: false, cycles: 7, dropped: 0, waiting: 0, packet },
             &mut self.burst,
         );
         (self.mode, self.fault) = (outputs.record.mode, outputs.record.fault);
@@ -101,10 +101,8 @@ impl Board {
         if let Some(reply) = outputs.reply {
             said.extend(frame(&reply));
         }
-        if let Some(signals) = outputs.telemetry {
-            let mut record = outputs.record;
-            record.keep(signals);
-            said.extend(frame(&Reply::Record(record)));
+        if let Some(form) = outputs.telemetry {
+            said.extend(frame(&form.of(outputs.record)));
         }
         said
     }

@@ -14,7 +14,7 @@ struct Served {
 impl Served {
     fn start(scene: &str) -> Self {
         let mut child = Command::new(env!("CARGO_BIN_EXE_blindgrasp"))
-            .args(["serve", scene])
+            .args(["serve", scene, "--baud", "3000000"])
             .stdout(Stdio::piped())
             .stderr(Stdio::null())
             .spawn()
@@ -70,14 +70,12 @@ fn the_python_client_grasps_with_a_simulated_hand() {
     let counted: serde_json::Value = serde_json::from_str(err.lines().last().unwrap_or_default())
         .unwrap_or_else(|error| panic!("{error}: {err}"));
     println!("{counted}");
-    for fine in ["lost", "unusable", "damaged", "malformed"] {
+    for fine in ["lost", "damaged", "malformed"] {
         assert_eq!(counted[fine], 0, "{fine}");
     }
     let records = counted["records"].as_u64().expect("a number");
     // 2 s of grasping and 0.3 s of releasing; fewer where the hand's ticks were late and had to be left out.
     assert!(records >= 1500, "{counted}");
-    assert!(counted["dense"].as_u64().expect("a number") * 10 > records * 9, "{counted}");
-    assert!(counted["snapshots"].as_u64().expect("a number") >= 1, "{counted}");
 
     let rows: Vec<Vec<&str>> = out.lines().skip(1).map(|line| line.split(',').collect()).collect();
     assert_eq!(rows.len() as u64, records);
@@ -88,7 +86,7 @@ fn the_python_client_grasps_with_a_simulated_hand() {
     assert_eq!(releasing, 300, "the release takes 300 ms");
     let names: Vec<&str> = out.lines().next().expect("a head").split(',').collect();
     let column = |name: &str| names.iter().position(|&other| other == name).expect("a column");
-    // The force that was asked for is there after the soft start; its half precision is exact.
+    // The force that was asked for is there after the soft start.
     let force_n = column("force_n");
     assert!(rows.iter().any(|row| row[2] == "Grasping" && row[force_n] == "5"));
     let (first, last) = (column("count_0"), column("count_11"));

@@ -8,7 +8,7 @@ use crate::command::{Command, Refusal};
 use crate::event::{Event, Events};
 use crate::fault::Raised;
 use crate::identity::{Clock, Identity};
-use crate::link::message::{Packet, Reply, Request, Signals};
+use crate::link::message::{Form, Packet, Reply, Request, Signals};
 use crate::link::rate::FIRST_BAUD;
 use crate::supervisor::Mode;
 use crate::telemetry::burst::{Burst, Caught};
@@ -45,6 +45,8 @@ pub struct Inputs<const J: usize> {
     pub cycles: u32,
     /// Records and replies that were lost since the start because a queue was full.
     pub dropped: u32,
+    /// Records and parts of snapshots that still wait for the line.
+    pub waiting: usize,
     /// A request.
     pub packet: Option<Packet<J>>,
 }
@@ -58,8 +60,8 @@ pub struct Outputs<const J: usize> {
     pub powered: bool,
     /// What the tick did.
     pub record: Record<J>,
-    /// Whether the record is to be sent, and what of it.
-    pub telemetry: Option<Signals>,
+    /// How the tick is told of, if it is.
+    pub telemetry: Option<Form>,
     /// The answer to the request.
     pub reply: Option<Reply<'static, J>>,
     /// The rate that the line is to have once the answer has left, baud.
@@ -140,12 +142,9 @@ impl<const J: usize, const F: usize> Device<J, F> {
         output.record.cycles = inputs.cycles;
         output.record.dropped = inputs.dropped;
         burst.take(&output.record);
-        self.telemetry.adapt(inputs.dropped);
-        let part = self.part(output.record.tick);
-        let telemetry = self.telemetry.due();
-        if self.telemetry.decimation > 0 {
-            output.record.decimation = self.telemetry.decimation;
-        }
+        let part = self.part(output.record.tick, inputs.waiting);
+        let telemetry = self.telemetry.due(inputs.waiting);
+        output.record.decimation = self.telemetry.told_every();
         if telemetry.is_some() {
             output.record.sequence = self.telemetry.sent;
             self.telemetry.sent = self.telemetry.sent.wrapping_add(1);
@@ -170,7 +169,7 @@ impl<const J: usize, const F: usize> Device<J, F> {
     }
 
     /// Saves the state where it is due, and the part of it that is to be sent now.
-    fn part(&mut self, tick: u32) -> Option<Part> {
+    fn part(&mut self, tick: u32, waiting: usize) -> Option<Part> {
         if !self.telemetry.sends_state() {
             return None;
         }
@@ -178,7 +177,7 @@ impl<const J: usize, const F: usize> Device<J, F> {
             let (state, params) = (&self.state, &self.params);
             self.snapshot.begin(tick, |buffer| state.save(params, buffer));
         }
-        if self.telemetry.part_is_due() { self.snapshot.next() } else { None }
+        if self.telemetry.part_is_due(waiting) { self.snapshot.next() } else { None }
     }
 
     /// What becomes of a request before the tick.
@@ -327,85 +326,74 @@ impl Session {
 const STATE_EVERY_TICKS: u32 = 1000;
 /// Ticks from one part of a snapshot to the next.
 const PART_EVERY_TICKS: u32 = 4;
-/// Ticks in which a change of the decimation shows.
-const ADAPT_EVERY_TICKS: u32 = 64;
-/// Largest decimation that a device chooses by itself.
-const DECIMATION_MOST: u16 = 1000;
+/// Records and parts of snapshots that can wait for the line.
+pub const WAITING_MOST: usize = 7;
+/// A full record is told while no more than so many wait, and a part of a snapshot while no more than so many do; input
+/// records always are. So a line that has time for the input records gets all of them, and in the time that is left, snapshots,
+/// and then full records.
+const FULL_WAITING_MOST: usize = 1;
+const PART_WAITING_MOST: usize = 3;
+/// A full record that is overdue for so many ticks is told as soon as there is room at all: the line has no time even for
+/// the input records.
+const OVERDUE_TICKS: u16 = 100;
 
 /// Which records are sent.
 #[derive(Clone, Copy, Debug)]
 struct Telemetry {
     /// What was asked for: one in so many ticks; 0 for none.
-    asked: u16,
-    /// The same as it is now, for a line that is slower.
     decimation: u16,
     signals: Signals,
-    /// Ticks until the next record.
-    left: u32,
-    /// Records sent so far.
+    /// Ticks until the next full record, and for how long it could not be told.
+    left: u16,
+    overdue: u16,
+    /// Records sent so far, input records among them.
     sent: u32,
-    /// No record was sent since it was asked for.
-    is_new: bool,
     /// Ticks until the next snapshot, and until the next part of one.
     state_left: u32,
     part_left: u32,
-    /// What was lost so far, and whether some of it was lost since the decimation was chosen, so many ticks ago.
-    dropped: u32,
-    loses: bool,
-    chosen: u32,
 }
 
 impl Telemetry {
     const OFF: Self = Self {
-        asked: 0,
         decimation: 0,
         signals: Signals::NONE,
         left: 0,
+        overdue: 0,
         sent: 0,
-        is_new: true,
         state_left: 0,
         part_left: 0,
-        dropped: 0,
-        loses: false,
-        chosen: 0,
     };
 
     /// What is asked for from now on.
     fn begin(&mut self, decimation: u16, signals: Signals) {
-        let Self { sent, dropped, .. } = *self;
-        *self = Self { asked: decimation, decimation, signals, sent, dropped, ..Self::OFF };
+        *self = Self { decimation, signals, sent: self.sent, ..Self::OFF };
     }
 
-    /// Sends less when the line does not take it all.
-    fn adapt(&mut self, dropped: u32) {
-        let lost = dropped != self.dropped;
-        self.dropped = dropped;
-        if self.decimation == 0 {
-            return;
-        }
-        self.loses |= lost;
-        self.chosen = self.chosen.saturating_add(1);
-        if self.loses && self.chosen >= ADAPT_EVERY_TICKS {
-            self.decimation = self.decimation.saturating_mul(2).min(DECIMATION_MOST.max(self.asked));
-            self.loses = false;
-            self.chosen = 0;
-        }
+    /// Whether input records stand in for full ones.
+    fn has_inputs(&self) -> bool {
+        self.signals.contain(Signals::INPUTS)
     }
 
-    /// Whether this tick's record is to be sent.
-    fn due(&mut self) -> Option<Signals> {
+    /// Ticks from one that is told of to the next, if the line takes it.
+    fn told_every(&self) -> u16 {
+        if self.has_inputs() { 1 } else { self.decimation.max(1) }
+    }
+
+    /// How this tick is told of.
+    fn due(&mut self, waiting: usize) -> Option<Form> {
         if self.decimation == 0 {
             return None;
         }
         if self.left > 0 {
             self.left -= 1;
-            return None;
+        } else if waiting <= FULL_WAITING_MOST || self.overdue >= OVERDUE_TICKS - 1 && waiting < WAITING_MOST
+        {
+            (self.left, self.overdue) = (self.decimation - 1, 0);
+            return Some(Form::Full(self.signals));
+        } else {
+            self.overdue = self.overdue.saturating_add(1);
         }
-        self.left = u32::from(self.decimation) - 1;
-        // What a host begins with is whole, whatever the link sent to one before.
-        let left_out = if self.is_new { Signals::DENSE } else { Signals::NONE };
-        self.is_new = false;
-        Some(self.signals.without(left_out))
+        self.has_inputs().then_some(Form::Input)
     }
 
     /// Whether snapshots are sent.
@@ -423,12 +411,12 @@ impl Telemetry {
         is_due
     }
 
-    /// Whether a part is to be sent: as much more rarely than asked for as records are.
-    fn part_is_due(&mut self) -> bool {
+    /// Whether a part is to be sent.
+    fn part_is_due(&mut self, waiting: usize) -> bool {
         self.part_left = self.part_left.saturating_sub(1);
-        let is_due = self.part_left == 0;
+        let is_due = self.part_left == 0 && waiting <= PART_WAITING_MOST;
         if is_due {
-            self.part_left = PART_EVERY_TICKS * u32::from(self.decimation / self.asked.max(1)).max(1);
+            self.part_left = PART_EVERY_TICKS;
         }
         is_due
     }

@@ -85,11 +85,6 @@ impl Limiting {
         self.0
     }
 
-    /// The reasons of such bits; the upper four have no meaning.
-    pub(crate) const fn from_bits(bits: u8) -> Self {
-        Self(bits & 0xf)
-    }
-
     /// The reasons.
     pub fn iter(self) -> impl Iterator<Item = Limit> {
         Limit::ALL.into_iter().filter(move |&limit| self.contains(limit))

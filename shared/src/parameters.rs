@@ -170,6 +170,17 @@ impl Parameter {
         Self((ROWS.len() + number) as u8)
     }
 
+    /// The limits of the gains, in the order of the table of [gains](crate::control::GAINS).
+    pub const GAIN_LIMITS: [Self; GAIN_COUNT] = {
+        let mut limits = [Self(0); GAIN_COUNT];
+        let mut k = 0;
+        while k < GAIN_COUNT {
+            limits[k] = Self((ROWS.len() + GAIN_COUNT + k) as u8);
+            k += 1;
+        }
+        limits
+    };
+
     /// Returns the number of its row, which is its byte on the line.
     pub const fn number(self) -> u8 {
         self.0

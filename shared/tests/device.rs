@@ -4,11 +4,11 @@ mod common;
 
 use blindgrasp_shared::command::{Command, Grasp, Refusal};
 use blindgrasp_shared::control::{GAIN_COUNT, PerGain};
-use blindgrasp_shared::device::{Device, Inputs, Outputs, Reading};
+use blindgrasp_shared::device::{Device, Inputs, Outputs, Reading, WAITING_MOST};
 use blindgrasp_shared::event::Event;
 use blindgrasp_shared::fault::{Fault, Raised};
 use blindgrasp_shared::identity::{Clock, Identity, Image, ResetCause};
-use blindgrasp_shared::link::message::{Packet, Reply, Request, Sample, Signals, not_understood};
+use blindgrasp_shared::link::message::{Form, Packet, Reply, Request, Sample, Signals, not_understood};
 use blindgrasp_shared::link::{self, Receiver, most_bytes};
 use blindgrasp_shared::parameters::{Bound, Parameter, Setting};
 use blindgrasp_shared::supervisor::Mode;
@@ -40,6 +40,7 @@ struct Bench {
     device: Device<12, 3>,
     burst: Box<Burst<12>>,
     dropped: u32,
+    waiting: usize,
     session: u16,
     sequence: u16,
 }
@@ -53,6 +54,7 @@ impl Bench {
             device: Device::new(params(&config), identity(clock)),
             burst: Box::new(Burst::new()),
             dropped: 3,
+            waiting: 0,
             session: 0,
             sequence: 0,
         }
@@ -73,10 +75,16 @@ impl Bench {
     }
 
     fn tick_with(&mut self, reading: Reading<12>, dropped: u32, packet: Option<Packet12>) -> Outputs<12> {
-        self.device.tick(
-            &Inputs { reading, late: false, supply_low: false, cycles: 7, dropped, packet },
-            &mut self.burst,
-        )
+        let inputs = Inputs {
+            reading,
+            late: false,
+            supply_low: false,
+            cycles: 7,
+            dropped,
+            waiting: self.waiting,
+            packet,
+        };
+        self.device.tick(&inputs, &mut self.burst)
     }
 
     fn packet(&mut self, request: Request<12>) -> Packet12 {
@@ -432,7 +440,7 @@ fn records_come_as_asked_for() {
         for tick in 0..60 {
             let outputs = bench.tick(packet.take());
             let due = tick % usize::from(decimation) == 0;
-            assert_eq!(outputs.telemetry, due.then_some(Signals::COUNTS), "{decimation} {tick}");
+            assert_eq!(outputs.telemetry, due.then_some(Form::Full(Signals::COUNTS)), "{decimation} {tick}");
             assert_eq!((outputs.record.cycles, outputs.record.dropped), (7, 3));
             if due {
                 sequences.push(outputs.record.sequence);
@@ -463,6 +471,7 @@ fn joints_over_the_link_are_for_another_image_and_real_ones_may_fail() {
         supply_low: false,
         cycles: 0,
         dropped: 0,
+        waiting: 0,
         packet: None,
     };
     let record = bench.device.tick(&inputs, &mut bench.burst).record;
@@ -620,47 +629,36 @@ fn the_burst_holds_what_was_around_the_fault_until_the_hand_is_armed() {
 }
 
 #[test]
-fn what_is_lost_doubles_the_decimation_until_nothing_is() {
+fn where_records_wait_for_the_line_input_records_stand_in_for_full_ones() {
     let mut bench = Bench::new();
-    full(&mut bench, 3);
-    let mut seen = Vec::new();
-    let mut sent = Vec::new();
-    for tick in 0..2000_u32 {
-        // Until one in 48 is sent, something is lost all the time.
-        bench.dropped += u32::from(tick < 1500 && seen.last() != Some(&48) && tick > 10);
-        let outputs = bench.tick(None);
-        let decimation = outputs.record.decimation;
-        if seen.last() != Some(&decimation) {
-            seen.push(decimation);
-            println!("tick {tick}: one in {decimation}");
-        }
-        if outputs.telemetry.is_some() {
-            sent.push((outputs.record.tick, decimation));
-        }
-    }
-    assert_eq!(seen[..5], [3, 6, 12, 24, 48]);
-    // What was lost just before the last doubling may cost one more.
-    assert!(seen.len() <= 6, "{seen:?}");
-    assert!(
-        sent.windows(2).all(|pair| pair[1].0 - pair[0].0 == u32::from(pair[0].1)),
-        "as the record before said"
-    );
-    full(&mut bench, 3);
-    assert_eq!(bench.tick(None).record.decimation, 3);
-    // One in a thousand is the least that it chooses by itself.
-    full(&mut bench, 700);
-    let mut last = 0;
-    for _ in 0..1000 {
-        bench.dropped += 1;
-        last = bench.tick(None).record.decimation;
-    }
-    assert_eq!(last, 1000);
-    full(&mut bench, 5000);
-    for _ in 0..200 {
-        bench.dropped += 1;
-        last = bench.tick(None).record.decimation;
-    }
-    assert_eq!(last, 5000, "it was asked for");
+    full(&mut bench, 1);
+    let forms = |bench: &mut Bench, waiting: usize, ticks: usize| {
+        bench.waiting = waiting;
+        let told = (0..ticks).map(|_| bench.tick(None)).collect::<Vec<_>>();
+        assert!(told.iter().all(|outputs| outputs.record.decimation == 1), "every tick is told of");
+        let is_full = |outputs: &&Outputs<12>| outputs.telemetry == Some(Form::Full(Signals::FULL));
+        let full = told.iter().filter(is_full).count();
+        let inputs = told.iter().filter(|outputs| outputs.telemetry == Some(Form::Input)).count();
+        (full, inputs, told.iter().filter(|outputs| outputs.part.is_some()).count())
+    };
+    forms(&mut bench, 0, 200);
+    assert_eq!(forms(&mut bench, 0, 90), (90, 0, 0), "the snapshot is over");
+    assert_eq!(forms(&mut bench, 1, 90), (90, 0, 0));
+    assert_eq!(forms(&mut bench, 2, 90), (0, 90, 0));
+    assert_eq!(forms(&mut bench, 0, 90), (90, 0, 0), "and back at once");
+    // The next snapshot begins.
+    assert_eq!(forms(&mut bench, 4, 1000).2, 0);
+    assert!(forms(&mut bench, 3, 80).2 >= 10);
+    // A line that is too slow for all input records gets a full one now and then; where there is no room, not even that.
+    assert_eq!(forms(&mut bench, WAITING_MOST - 1, 1000).0, 10);
+    assert_eq!(forms(&mut bench, WAITING_MOST, 1000).0, 0);
+    // Nothing stands in where it was not asked for.
+    bench.done(Request::Telemetry { decimation: 3, signals: Signals::ALL });
+    bench.waiting = 2;
+    assert!((0..90).all(|_| bench.tick(None).telemetry.is_none()));
+    bench.waiting = 0;
+    let told = (0..90).map(|_| bench.tick(None)).filter(|outputs| outputs.telemetry.is_some());
+    assert_eq!(told.map(|outputs| outputs.record.decimation).collect::<Vec<_>>(), [3; 30]);
     bench.done(Request::Telemetry { decimation: 0, signals: Signals::NONE });
     assert_eq!(bench.tick(None).record.decimation, 1, "where nothing is sent");
 }

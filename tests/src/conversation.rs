@@ -50,7 +50,7 @@ impl Heard {
             | Reply::Answer { sequence, .. }
             | Reply::Value { sequence, .. }
             | Reply::Burst { sequence, .. } => Some(sequence),
-            Reply::Record(_) | Reply::Snapshot(_) => None,
+            Reply::Record(_) | Reply::Snapshot(_) | Reply::Input(_) => None,
         }
     }
 

@@ -507,7 +507,7 @@ fn instructions_are_within_limits_and_as_written_down() {
         ("law_gravity_on", 3_300),
         ("tick", 12_000),
         ("encode_full", u64::MAX),
-        ("encode_dense", u64::MAX),
+        ("encode_input", u64::MAX),
         ("save", u64::MAX),
     ];
     /// By which part of it a figure may differ from the one that is written down, because compilers differ.

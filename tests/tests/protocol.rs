@@ -13,12 +13,12 @@ use blindgrasp_shared::fault::{Fault, Raised, Reaction};
 use blindgrasp_shared::identity::{BrownOut, Clock, Crash, CrashKind, Identity, Image, ResetCause, UNITS};
 use blindgrasp_shared::limit::{Limit, Limiting};
 use blindgrasp_shared::link::message::{Packet, Reply, Request, Sample, Signals};
-use blindgrasp_shared::link::{FrameError, HearError, Heard, Listener, Receiver, Sender, encode, most_bytes};
+use blindgrasp_shared::link::{FrameError, InputRecord, Receiver, encode, most_bytes};
 use blindgrasp_shared::parameters::{Bound, Each, Parameter, Setting};
 use blindgrasp_shared::signals::Told;
 use blindgrasp_shared::supervisor::{Event as ModeEvent, Mode, Outcome, outcome};
 use blindgrasp_shared::telemetry::snapshot::{PART_BYTES, Part};
-use blindgrasp_shared::telemetry::{INTERFACE_VERSION, List, Record, dense};
+use blindgrasp_shared::telemetry::{INTERFACE_VERSION, List, Record};
 use blindgrasp_shared::tick::{Input, Params, State, tick};
 use blindgrasp_tests::generated::{check, check_file, table};
 use blindgrasp_tests::images::root;
@@ -242,12 +242,6 @@ fn grasping(k: u32, decimation: u16, step: i32) -> AnyRecord {
     }
 }
 
-/// The same hand at rest.
-fn resting(k: u32) -> AnyRecord {
-    let Record { sequence, tick, .. } = grasping(k, 1, 0);
-    Record { sequence, tick, ..grasping(64, 1, 0) }
-}
-
 /// Every reply.
 fn replies() -> Vec<(&'static str, Reply<'static, J>)> {
     let answer = |refused| Reply::Answer { sequence: 0x1235, refused };
@@ -287,6 +281,8 @@ fn replies() -> Vec<(&'static str, Reply<'static, J>)> {
         ("record of twelve joints", Reply::Record(grasping(64, 1, 20))),
         ("record of a burst", Reply::Burst { sequence: 0x1243, index: 191, count: 256, record: faulted() }),
         ("last part of a snapshot", Reply::Snapshot(part)),
+        ("input record of three joints in a fault", Reply::Input(InputRecord::of(&faulted()))),
+        ("input record of twelve joints", Reply::Input(InputRecord::of(&grasping(64, 1, 20)))),
     ]
 }
 
@@ -432,202 +428,6 @@ fn malformed() -> Vec<serde_json::Value> {
     vectors
 }
 
-/// A stream of records as it was sent, and what of it comes to a listener.
-struct Stream {
-    sender: Sender<J>,
-    listener: Listener<J>,
-    signals: Signals,
-    steps: Vec<serde_json::Value>,
-}
-
-impl Stream {
-    fn new(signals: Signals) -> Self {
-        Self { sender: Sender::new(), listener: Listener::new(), signals, steps: Vec::new() }
-    }
-
-    /// The payload that a record is sent as.
-    fn send(&mut self, record: &AnyRecord) -> Vec<u8> {
-        let mut buffer = [0; most_bytes(ROOM)];
-        payload(self.sender.record(record, self.signals, &mut buffer).expect("there is room"))
-    }
-
-    /// Sends a record that is lost.
-    fn lose(&mut self, record: &AnyRecord) {
-        self.send(record);
-    }
-
-    /// Sends a record that arrives: whether it was sent dense, and the record that is heard, or why none is.
-    fn arrive(&mut self, record: &AnyRecord) -> Result<bool, HearError> {
-        let payload = self.send(record);
-        let is_dense = payload[0] == dense::TAG;
-        let heard = self.hear(&payload)?;
-        let mut kept = record.clone();
-        kept.keep(self.signals);
-        assert_eq!(heard, if is_dense { dense::quantised(&kept) } else { kept });
-        Ok(is_dense)
-    }
-
-    /// Takes a payload, and notes what came of it.
-    fn hear(&mut self, payload: &[u8]) -> Result<AnyRecord, HearError> {
-        let heard = self.listener.hear(payload);
-        let noted = match &heard {
-            Ok(Heard { reply: Reply::Record(record), digest }) => {
-                json!({ "record": record, "digest": digest })
-            }
-            Ok(other) => panic!("{other:?}"),
-            Err(error) => json!(format!("{error:?}")),
-        };
-        self.steps.push(json!({ "payload": hex(payload), "heard": noted }));
-        match heard?.reply {
-            Reply::Record(record) => Ok(record),
-            other => panic!("{other:?}"),
-        }
-    }
-
-    fn vector(self, name: &str) -> serde_json::Value {
-        json!({ "name": name, "steps": self.steps })
-    }
-}
-
-const DENSE: Signals = Signals::ALL.and(Signals::DENSE);
-
-fn streams() -> Vec<serde_json::Value> {
-    let mut vectors = Vec::new();
-
-    let mut stream = Stream::new(DENSE);
-    assert_eq!(stream.arrive(&grasping(0, 1, 3)), Ok(false), "the first is whole");
-    // A sender takes many bits until it knows how fast the counts change.
-    for k in 1..12 {
-        assert_eq!(stream.arrive(&grasping(k, 1, 3)), Ok(true));
-    }
-    vectors.push(stream.vector("a full record and dense ones"));
-
-    let mut stream = Stream::new(DENSE);
-    let lengths: Vec<usize> = (0..13)
-        .map(|k| {
-            let payload = stream.send(&resting(k));
-            assert!(stream.hear(&payload).is_ok());
-            payload.len()
-        })
-        .collect();
-    assert!(lengths[1..].iter().all(|&length| length == lengths[12]), "{lengths:?}");
-    let works = |k| Record { work_j: 0.25, ..resting(k) };
-    stream.lose(&works(13));
-    (14..22).for_each(|k| assert_eq!(stream.arrive(&works(k)), Ok(true)));
-    vectors.push(stream.vector("law and ledger that stand still, but for work that is lost, and told again"));
-
-    let mut stream = Stream::new(DENSE);
-    (0..12).for_each(|k| assert!(stream.arrive(&grasping(k, 1, 3)).is_ok()));
-    stream.lose(&grasping(12, 1, 3));
-    assert_eq!(stream.arrive(&grasping(13, 1, 3)), Ok(true), "one that was lost costs itself only");
-    (14..21).for_each(|k| stream.lose(&grasping(k, 1, 3)));
-    assert_eq!(stream.arrive(&grasping(21, 1, 3)), Ok(true), "seven that were lost, too");
-    (22..30).for_each(|k| stream.lose(&grasping(k, 1, 3)));
-    assert_eq!(stream.arrive(&grasping(30, 1, 3)), Err(HearError::Lost), "eight are too many");
-    assert_eq!(stream.arrive(&grasping(31, 1, 3)), Err(HearError::Lost));
-    let answer = Some(Answer { command: Command::Release, refused: None });
-    assert_eq!(
-        stream.arrive(&Record { answer, ..grasping(32, 1, 3) }),
-        Ok(false),
-        "an answer needs a full one"
-    );
-    assert_eq!(stream.arrive(&grasping(33, 1, 3)), Ok(true));
-    vectors.push(stream.vector("lost records, recovered and not"));
-
-    let mut stream = Stream::new(DENSE);
-    stream.lose(&grasping(0, 1, 3));
-    assert_eq!(stream.arrive(&grasping(1, 1, 3)), Err(HearError::NoFullRecord));
-    vectors.push(stream.vector("a dense record without a full one before it"));
-
-    let mut stream = Stream::new(DENSE);
-    for k in 0..4 {
-        assert!(stream.arrive(&grasping(k, 1, 3)).is_ok());
-    }
-    let mut wrong = stream.send(&grasping(4, 1, 3));
-    let check_at = wrong.len() - 3;
-    wrong[check_at] ^= 0x40;
-    assert_eq!(stream.hear(&wrong), Err(HearError::Lost));
-    assert_eq!(
-        stream.arrive(&grasping(5, 1, 3)),
-        Err(HearError::Lost),
-        "it stays so until the next full one"
-    );
-    vectors.push(stream.vector("a wrong check"));
-
-    let mut stream = Stream::new(DENSE);
-    let joint = Some(Raised::at(4, Fault::Overspeed));
-    let fault = |k| Record { mode: Mode::Fault, fault: joint, ..grasping(k, 1, 3) };
-    let unread = Record {
-        fault: Some(Raised::of_hand(Fault::LinkLost)),
-        reading_failed: Some(Raised::at(11, Fault::SampleMissing)),
-        counts: counts(&[]),
-        ..fault(2)
-    };
-    let mut limits: Vec<&[Limit]> = vec![&[]; JOINTS];
-    limits[0] = &[Limit::Slew];
-    limits[11] = &[Limit::Torque, Limit::LowerStop];
-    for record in [
-        grasping(0, 1, 3),
-        fault(1),
-        unread,
-        Record { limiting: limiting(&limits), late_ticks: 3, dropped: 9, ..grasping(3, 1, 3) },
-        Record {
-            late_ticks: 14,
-            dropped: 9,
-            events: Events::NONE.with(Event::Late, true),
-            ..grasping(4, 1, 3)
-        },
-    ] {
-        stream.arrive(&record).expect("nothing was lost");
-    }
-    vectors.push(stream.vector("faults, limits, a reading that failed, late ticks"));
-
-    for (step, name) in [(40, "counts that change fast"), (3000, "counts that change very fast")] {
-        let mut stream = Stream::new(DENSE);
-        (0..3).for_each(|k| assert!(stream.arrive(&grasping(k, 1, step)).is_ok()));
-        vectors.push(stream.vector(name));
-    }
-
-    let mut stream = Stream::new(DENSE);
-    for k in 0..4_u32 {
-        let near_the_end = |value: u32| value.wrapping_add(k.wrapping_mul(3));
-        let record = grasping(k, 3, 5);
-        let mut wrapping = [0; J];
-        let beyond = i32::MAX - 7;
-        wrapping.iter_mut().for_each(|count| *count = beyond.wrapping_add(5 * k as i32));
-        let counts = List::first_of(wrapping, JOINTS);
-        let tick = near_the_end(u32::MAX - 4);
-        let sequence = (u32::MAX - 1).wrapping_add(k);
-        stream.arrive(&Record { sequence, tick, counts, ..record }).expect("nothing was lost");
-    }
-    vectors.push(stream.vector("one in three ticks; numbers and counts run over"));
-
-    let mut stream = Stream::new(DENSE);
-    let unread = |k| Record {
-        reading_failed: Some(Raised::at(0, Fault::SampleMissing)),
-        counts: counts(&[]),
-        ..grasping(k, 1, 3)
-    };
-    assert_eq!(stream.arrive(&grasping(0, 1, 3)), Ok(false));
-    (1..8).for_each(|k| assert_eq!(stream.arrive(&unread(k)), Ok(true)));
-    assert_eq!(stream.arrive(&grasping(8, 1, 3)), Ok(true), "counts of eight records ago will do");
-    (9..17).for_each(|k| assert_eq!(stream.arrive(&unread(k)), Ok(true)));
-    assert_eq!(stream.arrive(&grasping(17, 1, 3)), Ok(false), "those of nine will not");
-    vectors.push(stream.vector("readings that fail for long"));
-
-    let mut stream = Stream::new(DENSE);
-    (0..3).for_each(|k| assert!(stream.arrive(&grasping(k, 1, 3)).is_ok()));
-    stream.signals = Signals::TORQUES.and(Signals::DENSE);
-    (3..11).for_each(|k| assert_eq!(stream.arrive(&grasping(k, 1, 3)), Ok(false), "eight are whole"));
-    assert_eq!(stream.arrive(&grasping(11, 1, 3)), Ok(true));
-    vectors.push(stream.vector("other parts"));
-
-    let mut stream = Stream::new(Signals::COUNTS.and(Signals::DENSE));
-    (0..4).for_each(|k| assert!(stream.arrive(&grasping(k, 1, 3)).is_ok()));
-    vectors.push(stream.vector("counts alone"));
-    vectors
-}
-
 #[test]
 fn every_message_is_among_the_vectors() {
     let mut requests: Vec<usize> = packets().iter().map(|(_, packet)| number(&packet.request)).collect();
@@ -635,7 +435,7 @@ fn every_message_is_among_the_vectors() {
     assert_eq!(requests, (0..10).collect::<Vec<_>>());
     let mut numbers: Vec<u8> = replies().iter().map(|(_, reply)| payload(&frame(reply))[0]).collect();
     numbers.dedup();
-    assert_eq!(numbers, (0..dense::TAG).collect::<Vec<_>>());
+    assert_eq!(numbers, (0..7).collect::<Vec<_>>());
 }
 
 #[test]
@@ -646,7 +446,6 @@ fn the_vectors_are_those_of_the_code() {
         ("also_good", also_good()),
         ("damaged_frames", damaged()),
         ("malformed", malformed()),
-        ("streams", streams()),
     ];
     let mut text = format!("{{\n\"interface_version\": {INTERFACE_VERSION}");
     for (name, vectors) in &parts {
@@ -876,9 +675,6 @@ fn the_examples_of_the_document_are_those_of_the_code() {
     check(DOCUMENT, "examples", &text);
 }
 
-/// Bytes a second of a line of 1 Mbaud with 8 bits, a start bit and a stop bit.
-const LINE_BYTES_S: f64 = 1e6 / 10.0;
-
 /// Bytes on the wire of the parts of a snapshot of the paper's hand, while it grasps.
 fn snapshot_frames() -> Vec<usize> {
     let model = HandModel::load("three-finger").expect("it is built in");
@@ -905,64 +701,36 @@ fn snapshot_frames() -> Vec<usize> {
 
 #[test]
 fn the_budget_of_the_document_is_that_of_the_code() {
-    /// Bytes on the wire of a record in the dense form, after many like it.
-    fn dense_bytes(record: impl Fn(u32) -> AnyRecord) -> usize {
-        let mut sender = Sender::<J>::new();
-        let mut buffer = [0; most_bytes(ROOM)];
-        let mut bytes = 0;
-        for k in 0..64 {
-            let frame = sender.record(&record(k), DENSE, &mut buffer).expect("there is room");
-            assert_eq!(payload(frame)[0] == dense::TAG, k > 0);
-            bytes = frame.len();
+    // Counts of three bytes: more than four turns of a joint from the zero.
+    let turned = |joints: usize| {
+        let record = grasping(64, 1, 20);
+        let mut counts = [0; J];
+        (0..).zip(&mut counts).for_each(|(k, count)| *count = 100_000 - 13_000 * k);
+        let mut torques = [0.0; J];
+        (0..).zip(&mut torques).for_each(|(k, torque)| *torque = 0.3 - 0.01 * f32::from(k as u8));
+        let far = 1_000_000_000;
+        Record {
+            sequence: far,
+            tick: far,
+            counts: List::first_of(counts, joints),
+            torques_nm: List::first_of(torques, joints),
+            limiting: List::first_of([Limiting::NONE; J], joints),
+            ..record
         }
-        bytes
-    }
-    // Counts a turn of the paper's hand; the largest change of a count in a tick that each number of bits allows.
-    let rad_s = |change: i32| f64::from(change) * 2.0 * std::f64::consts::PI / 21_600.0 / 1e-3;
-    // `grasping` turns its joints by 2, 1, 0, -1 and -2 steps.
-    let turning = |change: i32| move |k: u32| grasping(k, 1, change / 2);
-    let limited = move |k: u32| {
-        let all: &[Limit] = &[Limit::Torque];
-        Record { limiting: limiting(&[all; JOINTS]), ..grasping(k, 1, 254 / 2) }
     };
-    let worst = move |k: u32| {
-        let all: &[Limit] = &[Limit::Torque];
-        let raised = Some(Raised::at(3, Fault::Overspeed));
-        Record { limiting: limiting(&[all; JOINTS]), fault: raised, ..grasping(k, 1, 4094 / 2) }
-    };
-    let full = frame(&Reply::Record(grasping(64, 1, 20))).len();
+    let [input_12, input_16] =
+        [12, 16].map(|joints| frame(&Reply::Input(InputRecord::of(&turned(joints)))).len());
+    let [full_12, full_16] = [12, 16].map(|joints| frame(&Reply::Record(turned(joints))).len());
+    assert!(input_12 <= 75 && input_16 <= 95, "{input_12}, {input_16}");
+    assert!(full_16 <= 240, "{full_16}");
     let snapshot = snapshot_frames();
-    let snapshot_bytes: usize = snapshot.iter().sum();
-    let mut rows = Vec::new();
-    let mut row = |what: String, bytes: f64| {
-        // Of 100 bytes a tick, so that it is a percentage as well.
-        assert!((LINE_BYTES_S / 1000.0 - 100.0).abs() < 1e-9);
-        rows.push([what, format!("{:.1}", bytes).trim_end_matches(".0").to_owned(), format!("{bytes:.0} %")]);
-        bytes
-    };
-    let at_rest = dense_bytes(resting) as f64;
-    let [slow, fast] = [14, 254].map(|change| dense_bytes(turning(change)) as f64);
-    let is_within =
-        |bytes: f64| assert!(bytes <= 80.0, "{bytes} bytes a tick leave less than a fifth of the line");
-    is_within(row("dense, at rest".into(), at_rest));
-    is_within(row(format!("dense, joints turn by up to 14 counts ({:.1} rad/s)", rad_s(14)), slow));
-    is_within(row(format!("dense, up to 254 counts ({:.0} rad/s)", rad_s(254)), fast));
-    is_within(row("the same, a joint is limited".into(), dense_bytes(limited) as f64));
-    row(
-        format!("dense, up to 4094 counts ({:.0} rad/s), limits and a fault", rad_s(4094)),
-        dense_bytes(worst) as f64,
-    );
-    row("full, of a grasp".into(), full as f64);
-    row("full, the longest there can be".into(), most_bytes(1 + Record::<JOINTS>::MOST_BYTES) as f64);
     let words =
-        format!("snapshots of a grasp: {} frames, {snapshot_bytes} bytes every 1000 ticks", snapshot.len());
-    let snapshots = row(words, snapshot_bytes as f64 / 1000.0);
-    let stream = |dense: f64| (99.0 * dense + full as f64) / 100.0 + snapshots;
-    is_within(row("all of it on average, at rest".into(), stream(at_rest)));
-    is_within(row(format!("all of it on average, at {:.0} rad/s", rad_s(254)), stream(fast)));
-    let parts = snapshot[0] as f64 / 4.0;
-    let words =
-        format!("while a snapshot is sent ({} ticks), at {:.0} rad/s", 4 * snapshot.len(), rad_s(254));
-    row(words, fast + parts);
-    check(DOCUMENT, "budget", &table(["of 12 joints", "bytes a tick", "of 1 Mbaud"], &rows));
+        format!("snapshots of a grasp, a tick on average: {} frames every 1000 ticks", snapshot.len());
+    let snapshots = snapshot.iter().sum::<usize>() as f64 / 1000.0;
+    let rows = [
+        ["input record".to_owned(), input_12.to_string(), input_16.to_string()],
+        ["full record".to_owned(), full_12.to_string(), full_16.to_string()],
+        [words, format!("{snapshots:.1}"), String::new()],
+    ];
+    check(DOCUMENT, "budget", &table(["bytes", "12 joints", "16 joints"], &rows));
 }

@@ -26,7 +26,7 @@ const FIGURES: [(&str, &str); 6] = [
     ("law_gravity_on", "grasp law with gravity compensation"),
     ("tick", "whole tick"),
     ("encode_full", "encoding of its record in full"),
-    ("encode_dense", "encoding of its record in the dense form"),
+    ("encode_input", "digest and encoding of its input record"),
     ("save", "saving its state, one tick in a thousand"),
 ];
 

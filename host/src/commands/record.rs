@@ -33,6 +33,9 @@ const LOOK_AGAIN: Duration = Duration::from_millis(500);
 /// `export` take. It is whole at every moment. A port that is unplugged is waited for, and the gap is in the file. Ctrl-C, or
 /// --duration, ends the recording.
 ///
+/// Where the line has no time for every record in full, an input record of each other tick stands in, of which `replay`
+/// computes the rest; `export` has the full records.
+///
 /// It only listens: a hand is commanded by `console --out FILE` or `monitor --out FILE`, which record in the same way. The
 /// heartbeat is kept while it records; a hand with torque lets go when it ends. A port that another program has open is refused.
 ///
@@ -92,6 +95,8 @@ struct Device {
     port: String,
     sessions: u64,
     records: u64,
+    /// Those of them that tell only what the tick took in: the line had no time for all in full.
+    input_records: u64,
     /// Records that are missing; of these, or of the answers, the device itself dropped some, ...
     missing: u64,
     dropped_by_device: u64,
@@ -256,6 +261,7 @@ fn finish(
             port: ports[k].clone(),
             sessions: totals.sessions,
             records: totals.records,
+            input_records: totals.inputs,
             missing: totals.missing,
             dropped_by_device: totals.dropped,
             lost_on_the_way: totals.missing.saturating_sub(totals.dropped),
@@ -303,6 +309,10 @@ fn describe(report: &Report) -> String {
             ),
         };
         line(name, format!("{records} records, {lost}"));
+        if device.input_records > 0 {
+            let inputs = device.input_records;
+            line("", format!("{inputs} of them tell only what the tick took in: `replay` computes the rest"));
+        }
         if device.decimation > 1 {
             line("", format!("one in up to {} ticks was sent", device.decimation));
         }

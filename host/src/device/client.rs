@@ -262,7 +262,7 @@ impl<T: Transport> Client<T> {
                     (sequence, Answer::Burst { count, record: Box::new(record) })
                 }
                 // The image for processor in the loop sends none.
-                Ok(Reply::Snapshot(_)) => {
+                Ok(Reply::Snapshot(_) | Reply::Input(_)) => {
                     self.traffic.frames_unexpected += 1;
                     continue;
                 }

@@ -3,12 +3,11 @@
 //! is dropped here, too, and counted in the same place.
 
 use crate::MAX_JOINTS;
-use crate::wire::{Packet, Record};
+use crate::wire::Packet;
 use blindgrasp_shared::command::{Command, Refusal};
-use blindgrasp_shared::device::Outputs;
-use blindgrasp_shared::link::message::{self, Request, Signals, not_understood};
-use blindgrasp_shared::link::{Receiver, Sender, may_take, most_bytes};
-use blindgrasp_shared::telemetry::snapshot::Part;
+use blindgrasp_shared::device::{Outputs, WAITING_MOST};
+use blindgrasp_shared::link::message::{self, Request, not_understood};
+use blindgrasp_shared::link::{Receiver, encode, may_take, most_bytes};
 use std::collections::VecDeque;
 use std::time::Duration;
 
@@ -18,16 +17,9 @@ type Reply = message::Reply<'static, MAX_JOINTS>;
 const STOPS: usize = 1;
 const PACKETS: usize = 7;
 const ANSWERS: usize = 7;
-const RECORDS: usize = 7;
 const REFUSALS: usize = 64;
 /// Bits of a byte on the line: one to start, one to stop.
 const BITS: f64 = 10.0;
-
-/// What the hand tells by itself.
-enum Telemetry {
-    Record(Box<Record>, Signals),
-    Part(Part),
-}
 
 /// The firmware's end of a line.
 pub struct Line {
@@ -37,8 +29,8 @@ pub struct Line {
     /// Requests that do not get to the tick.
     refusals: VecDeque<Reply>,
     answers: VecDeque<Reply>,
-    records: VecDeque<Telemetry>,
-    sender: Sender<MAX_JOINTS>,
+    /// Records and parts of snapshots.
+    records: VecDeque<Reply>,
     dropped: u32,
     /// Bytes in a second; infinite if the line is as fast as one likes.
     bytes_per_s: f64,
@@ -59,7 +51,6 @@ impl Line {
             refusals: VecDeque::new(),
             answers: VecDeque::new(),
             records: VecDeque::new(),
-            sender: Sender::new(),
             dropped: 0,
             bytes_per_s: if baud == 0 { f64::INFINITY } else { f64::from(baud) / BITS },
             credit_bytes: 0.0,
@@ -108,14 +99,19 @@ impl Line {
     /// is counted.
     pub fn post(&mut self, outputs: Outputs<MAX_JOINTS>) {
         self.answers.extend(outputs.reply);
-        let record = outputs.telemetry.map(|signals| Telemetry::Record(Box::new(outputs.record), signals));
-        for telemetry in record.into_iter().chain(outputs.part.map(Telemetry::Part)) {
-            if self.records.len() < RECORDS {
+        let record = outputs.telemetry.map(|form| form.of(outputs.record));
+        for telemetry in record.into_iter().chain(outputs.part.map(Reply::Snapshot)) {
+            if self.records.len() < WAITING_MOST {
                 self.records.push_back(telemetry);
             } else {
                 self.dropped = self.dropped.saturating_add(1);
             }
         }
+    }
+
+    /// Records and parts of snapshots that wait.
+    pub fn waiting(&self) -> usize {
+        self.records.len()
     }
 
     /// How much was dropped so far.
@@ -142,16 +138,10 @@ impl Line {
 
     /// Makes the next frame, if there is something to send: answers, then refusals, then telemetry.
     fn load(&mut self) -> bool {
+        let next = self.refusals.pop_front().or_else(|| self.answers.pop_front());
+        let Some(reply) = next.or_else(|| self.records.pop_front()) else { return false };
         let mut buffer = [0; most_bytes(Reply::MOST_BYTES)];
-        let sender = &mut self.sender;
-        let frame = match self.answers.pop_front().or_else(|| self.refusals.pop_front()) {
-            Some(reply) => sender.reply(&reply, &mut buffer),
-            None => match self.records.pop_front() {
-                Some(Telemetry::Record(record, signals)) => sender.record(&record, signals, &mut buffer),
-                Some(Telemetry::Part(part)) => sender.reply(&Reply::Snapshot(part), &mut buffer),
-                None => return false,
-            },
-        };
+        let frame = encode(&reply, &mut buffer);
         // The buffer has room for the longest reply.
         self.frame.clear();
         self.frame.extend_from_slice(frame.unwrap_or_default());

@@ -21,7 +21,7 @@ use std::time::{Duration, Instant};
 
 /// From one status of the link to the next.
 const STATUS: Duration = Duration::from_secs(1);
-/// From one record of a burst to the next: 150 bytes, where the records of 20 ms leave 400 on the line.
+/// From one record of a burst to the next: 8 bytes a tick, which input records and snapshots leave on the line.
 const BURST: Duration = Duration::from_millis(20);
 /// How long a parameter waits for others that are set together with it.
 const SETTLED: Duration = Duration::from_millis(50);
@@ -158,8 +158,10 @@ fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
 pub struct Totals {
     /// Sessions.
     pub sessions: u64,
-    /// Records that came and could be decoded.
+    /// Records that came and could be decoded, input records among them.
     pub records: u64,
+    /// Input records.
+    pub inputs: u64,
     /// Records that are missing, by the numbers of those that came.
     pub missing: u64,
     /// Records and answers that the device dropped because a queue was full.
@@ -182,6 +184,7 @@ impl Totals {
 
     fn add(&mut self, status: &LinkStatus) {
         self.records += status.records;
+        self.inputs += status.inputs;
         self.missing += status.missing;
         self.dropped += status.dropped;
         self.unusable += status.unusable;
@@ -249,7 +252,10 @@ impl Recorder {
 
     /// Ticks from one record to the next that are asked for: whoever asks the device for records asks for these.
     pub fn telemetry(&self) -> Request {
-        Request::Telemetry { decimation: self.decimation, signals: Signals::FULL }
+        // Where not every tick is asked for, none is to be told of instead.
+        let inputs = if self.decimation == 1 { Signals::INPUTS } else { Signals::NONE };
+        let signals = Signals::ALL.and(Signals::STATE).and(inputs);
+        Request::Telemetry { decimation: self.decimation, signals }
     }
 
     /// Takes an event of the talk, and asks it for what it needs.

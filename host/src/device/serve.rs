@@ -116,7 +116,7 @@ pub fn serve(
             let count = pty.receive(&mut received)?;
             line.take(&received[..count]);
         }
-        let turn = Turn { packet: line.packet(), late, dropped: line.dropped() };
+        let turn = Turn { packet: line.packet(), late, dropped: line.dropped(), waiting: line.waiting() };
         let (outputs, happened) = hand.turn(turn);
         line.post(outputs);
         line.send(period, &mut sent);

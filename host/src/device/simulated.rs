@@ -59,6 +59,8 @@ pub struct Turn {
     pub late: bool,
     /// What was dropped since the start.
     pub dropped: u32,
+    /// Records and parts of snapshots that wait for the line.
+    pub waiting: usize,
 }
 
 /// Where the world is.
@@ -145,9 +147,10 @@ impl SimulatedHand {
 
     /// One tick.
     pub fn turn(&mut self, turn: Turn) -> (Outputs<MAX_JOINTS>, Option<Happening>) {
-        let Turn { packet, late, dropped } = turn;
+        let Turn { packet, late, dropped, waiting } = turn;
         // There is no processor whose cycles could be counted.
-        let inputs = Inputs { reading: self.read(), late, supply_low: false, cycles: 0, dropped, packet };
+        let inputs =
+            Inputs { reading: self.read(), late, supply_low: false, cycles: 0, dropped, waiting, packet };
         let outputs = self.device.tick(&inputs, &mut self.burst);
         let wanted_nm = self.delay.pass(outputs.torques_nm);
         let happened = self.move_on(outputs.record.mode, &wanted_nm);

@@ -23,7 +23,7 @@ use blindgrasp_shared::command::{Command, Refusal};
 use blindgrasp_shared::fault::Raised;
 use blindgrasp_shared::link::message::{Reply, Signals};
 use blindgrasp_shared::link::rate::{self, FASTER_BAUDS, FIRST_BAUD, HostRate, Wanted};
-use blindgrasp_shared::link::{HearError, Listener, Receiver, encode, most_bytes};
+use blindgrasp_shared::link::{Receiver, encode, most_bytes};
 use blindgrasp_shared::parameters::Parameter;
 use blindgrasp_shared::supervisor::Mode;
 use blindgrasp_shared::telemetry::INTERFACE_VERSION;
@@ -161,7 +161,6 @@ struct Asked {
 pub struct Talk {
     patience: Patience,
     receiver: Receiver<MOST_RECEIVED>,
-    listener: Listener<MAX_JOINTS>,
     /// Payload of the last good frame.
     payload: Vec<u8>,
     tapped: bool,
@@ -201,7 +200,6 @@ impl Talk {
         Self {
             patience,
             receiver: Receiver::new(),
-            listener: Listener::new(),
             payload: Vec::new(),
             tapped: false,
             wished: RandomState::new().build_hasher().finish() as u16,
@@ -305,14 +303,12 @@ impl Talk {
             if self.tapped {
                 self.events.push_back(Event::Received(payload.clone()));
             }
-            match self.listener.hear(&payload) {
-                Ok(heard) => self.hear(heard.reply, now)?,
-                Err(HearError::Decode(_)) => match other_interface(&payload) {
+            match Reply::decode(&payload) {
+                Ok(reply) => self.hear(reply, now)?,
+                Err(_) => match other_interface(&payload) {
                     Some(theirs) => return Err(TalkError::OtherInterface { theirs }),
                     None => self.traffic.frames_unexpected += 1,
                 },
-                // One that can't be read without those that are missing, which the next full record helps.
-                Err(HearError::NoFullRecord | HearError::Lost) => {}
             }
         }
         self.payload = payload;
@@ -470,7 +466,7 @@ impl Talk {
                 (sequence, Answer::Burst { count, record: Box::new(record) })
             }
             // For those who record.
-            Reply::Snapshot(_) => return Ok(()),
+            Reply::Snapshot(_) | Reply::Input(_) => return Ok(()),
         };
         let Some(asked) = self.take_asked(sequence) else { return Ok(()) };
         if asked.again > 0 && answer == Answer::Refused(Refusal::Busy) {
@@ -526,7 +522,6 @@ impl Talk {
 
     fn open(&mut self, session: u16, now: Instant) {
         self.session = Some(session);
-        self.listener = Listener::new();
         (self.heartbeat, self.due) = (HEARTBEAT, now);
         self.rate.begin(self.wanted_bauds, self.ms(now));
         let heartbeat = Request::GetParameter { parameter: Parameter::HEARTBEAT_TIME, index: 0 };
@@ -538,7 +533,6 @@ impl Talk {
     fn start_anew(&mut self, now: Instant) {
         self.session = None;
         (self.begun, self.due, self.state) = (now, now, None);
-        self.listener = Listener::new();
         self.opening = None;
         self.events.push_back(Event::StartedAnew);
         // Who asked aside begins anew, too.

@@ -61,11 +61,12 @@ impl Twin {
             supply_low: false,
             cycles: 0,
             dropped: 0,
+            waiting: 0,
             packet: packet.cloned(),
         };
         let outputs = self.device.tick(&inputs, &mut self.burst);
         let answer = match outputs.reply {
-            None | Some(Reply::Record(_) | Reply::Snapshot(_)) => None,
+            None | Some(Reply::Record(_) | Reply::Snapshot(_) | Reply::Input(_)) => None,
             Some(Reply::Identity { session, identity, .. }) => {
                 Some(Answer::Identity { session, firmware: Firmware::from(&identity) })
             }

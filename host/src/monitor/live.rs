@@ -384,7 +384,7 @@ impl Follower {
 
 /// Every tick's record, and the parameters that are shown.
 fn ask_for_everything(firmware: &Firmware, talk: &mut Talk, now: Instant) {
-    talk.ask(Request::Telemetry { decimation: 1, signals: Signals::FULL }, now);
+    talk.ask(Request::Telemetry { decimation: 1, signals: Signals::ALL }, now);
     talk.ask(Request::GetParameter { parameter: Parameter::HEARTBEAT_TIME, index: 0 }, now);
     for index in 0..u8::try_from(firmware.joint_count).unwrap_or(u8::MAX) {
         talk.ask(Request::GetParameter { parameter: Parameter::TORQUE_LIMIT, index }, now);

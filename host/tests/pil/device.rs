@@ -133,8 +133,15 @@ impl Firmware {
             Reading::Failed,
         );
         let asked = packet.clone();
-        let inputs =
-            Inputs { reading, late: sample.late, supply_low: false, cycles: 1234, dropped: 0, packet };
+        let inputs = Inputs {
+            reading,
+            late: sample.late,
+            supply_low: false,
+            cycles: 1234,
+            dropped: 0,
+            waiting: 0,
+            packet,
+        };
         let outputs = self.device.tick(&inputs, &mut self.burst);
         let mut record = outputs.record;
         if self.wrong == Wrong::Used {

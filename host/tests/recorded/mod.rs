@@ -10,8 +10,8 @@ use blindgrasp_shared::command::Command;
 use blindgrasp_shared::device::{Device, Inputs, Reading};
 use blindgrasp_shared::fault::Raised;
 use blindgrasp_shared::identity::{Clock, Identity, Image, ResetCause, UNITS};
-use blindgrasp_shared::link::message::{Packet, Reply, Request, Signals};
-use blindgrasp_shared::link::{Receiver, Sender, most_bytes};
+use blindgrasp_shared::link::message::{Form, Packet, Reply, Request, Signals};
+use blindgrasp_shared::link::{Receiver, encode, most_bytes};
 use blindgrasp_shared::math::Real;
 use blindgrasp_shared::parameters::Parameter;
 use blindgrasp_shared::telemetry::burst::Burst;
@@ -71,7 +71,6 @@ pub(crate) struct Session {
     recorded: Recorded,
     device: Device<MAX_JOINTS, MAX_FINGERS>,
     burst: Box<Burst<MAX_JOINTS>>,
-    sender: Sender<MAX_JOINTS>,
     receiver: Receiver<1024>,
     buffer: Vec<u8>,
     session: u16,
@@ -84,6 +83,8 @@ pub(crate) struct Session {
     pub(crate) sent: u64,
     pub(crate) arrived: u64,
     pub(crate) dropped: u32,
+    /// How many records wait for the line in each tick.
+    pub(crate) waiting: fn(u32) -> usize,
 }
 
 fn device(model: &HandModel) -> Device<MAX_JOINTS, MAX_FINGERS> {
@@ -144,7 +145,6 @@ impl Session {
             writer,
             recorded,
             burst: Box::new(Burst::new()),
-            sender: Sender::new(),
             receiver: Receiver::new(),
             buffer: vec![0; most_bytes(Reply::<MAX_JOINTS>::MOST_BYTES)],
             session: 0,
@@ -154,6 +154,7 @@ impl Session {
             sent: 0,
             arrived: 0,
             dropped: 0,
+            waiting: |_| 0,
         }
     }
 
@@ -211,6 +212,7 @@ impl Session {
             supply_low: false,
             cycles: 10_003 + self.tick % 7,
             dropped: self.dropped,
+            waiting: (self.waiting)(self.time),
             packet,
         };
         let mut outputs = self.device.tick(&inputs, &mut self.burst);
@@ -218,10 +220,10 @@ impl Session {
             if let Reply::Identity { session, .. } = reply {
                 self.session = session;
             }
-            let frame = self.sender.reply(&reply, &mut self.buffer).unwrap().to_vec();
+            let frame = encode(&reply, &mut self.buffer).unwrap().to_vec();
             self.arrive(&frame);
         }
-        if let Some(signals) = outputs.telemetry {
+        if let Some(form) = outputs.telemetry {
             self.sent += 1;
             let mut record = outputs.record.clone();
             if let Fate::Flipped { joint, bit } = fate {
@@ -231,14 +233,14 @@ impl Session {
                 torques[joint] = f32::from_bits(torques[joint].to_bits() ^ 1 << bit);
                 record.torques_nm = blindgrasp_shared::telemetry::List::first_of(torques, told.len());
             }
-            let frame = self.sender.record(&record, signals, &mut self.buffer).unwrap().to_vec();
+            let frame = encode(&form.of(record), &mut self.buffer).unwrap().to_vec();
             if fate != Fate::IsLost {
                 self.arrived += 1;
                 self.arrive(&frame);
             }
         }
         if let Some(part) = outputs.part {
-            let frame = self.sender.reply(&Reply::Snapshot(part), &mut self.buffer).unwrap().to_vec();
+            let frame = encode(&Reply::<MAX_JOINTS>::Snapshot(part), &mut self.buffer).unwrap().to_vec();
             self.arrive(&frame);
         }
         self.time += 1;
@@ -285,7 +287,6 @@ impl Session {
         let (now, words) = (self.now(), "the port is gone");
         self.writer.gap(self.recorded, now, words).unwrap();
         self.device = device(&self.hand.model);
-        self.sender = Sender::new();
         (self.session, self.tick) = (0, 0);
         for _ in 0..ticks {
             self.pass();
@@ -314,7 +315,6 @@ pub(crate) fn simulation(
     let at = |tick: u32| Stamp(START_NS + u64::from(tick) * TICK_NS);
     writer.about(device, at(0), &about).unwrap();
     writer.parameters(device, at(0), &Setting::all(&params)).unwrap();
-    let mut sender = Sender::<MAX_JOINTS>::new();
     let mut buffer = vec![0; most_bytes(Reply::<MAX_JOINTS>::MOST_BYTES)];
     let mut records = Vec::new();
     for k in 0.. {
@@ -325,7 +325,7 @@ pub(crate) fn simulation(
             Told::Ideal => Input::ideal(&angles, &speeds, command),
         };
         let record = tick(&params, &mut state, &input).record;
-        let frame = sender.record(&record, signals, &mut buffer).unwrap().to_vec();
+        let frame = encode(&Form::Full(signals).of(record.clone()), &mut buffer).unwrap().to_vec();
         let mut receiver = Receiver::<1024>::new();
         for byte in frame {
             if let Some(payload) = receiver.push(byte) {

@@ -9,21 +9,11 @@ use blindgrasp_shared::event::{Event, Events};
 use blindgrasp_shared::fault::{Fault, Raised};
 use blindgrasp_shared::identity::{BrownOut, Clock, Identity, Image};
 use blindgrasp_shared::limit::{Limit, Limiting};
-use blindgrasp_shared::link::message::{Reply, Signals};
-use blindgrasp_shared::link::{Receiver, Sender};
+use blindgrasp_shared::link::message::Reply;
 use blindgrasp_shared::supervisor::Mode;
 use blindgrasp_shared::telemetry::{INTERFACE_VERSION, List};
 use blindgrasp_shared::tick::Params;
 use std::path::Path;
-
-const FRAME: usize = Reply::<MAX_JOINTS>::MOST_BYTES + 16;
-
-/// The payload of a frame.
-fn payload(frame: &[u8]) -> Vec<u8> {
-    let mut receiver = Receiver::<FRAME>::new();
-    let heard = frame.iter().find_map(|&byte| receiver.push(byte).map(|payload| payload.unwrap().to_vec()));
-    heard.unwrap()
-}
 
 /// Who a hand of `models/hands` is.
 pub(crate) fn about(hand: &str) -> About {
@@ -62,13 +52,12 @@ pub(crate) fn settings(hand: &str) -> Vec<Setting> {
 pub(crate) struct Hand {
     pub(crate) record: Record,
     joints: usize,
-    sender: Sender<MAX_JOINTS>,
 }
 
 impl Hand {
     pub(crate) fn new(joints: usize) -> Self {
         let record = Record { decimation: 1, ..Record::BLANK };
-        Self { record, joints, sender: Sender::new() }
+        Self { record, joints }
     }
 
     /// The next record, and the payload that it makes.
@@ -119,8 +108,7 @@ impl Hand {
         if failed {
             sent.counts = List::default();
         }
-        let mut buffer = [0; FRAME];
-        let payload = payload(self.sender.record(&sent, Signals::FULL, &mut buffer).unwrap());
+        let payload = postcard::to_allocvec(&Reply::Record(sent.clone())).unwrap();
         (sent, payload)
     }
 }

@@ -26,7 +26,7 @@ pub fn encode<'a, M: Serialize + ?Sized>(
 }
 
 /// A frame that is being written.
-pub(super) struct Writer<'a> {
+struct Writer<'a> {
     buffer: &'a mut [u8],
     /// Where the code byte of the block in work belongs: it is written when the block is complete.
     code_at: usize,
@@ -36,18 +36,18 @@ pub(super) struct Writer<'a> {
 }
 
 impl<'a> Writer<'a> {
-    pub(super) fn new(buffer: &'a mut [u8]) -> Self {
+    fn new(buffer: &'a mut [u8]) -> Self {
         Self { buffer, code_at: 0, next_at: 1, checksum: Checksum::START }
     }
 
     /// Adds a byte of the payload.
-    pub(super) fn push(&mut self, byte: u8) -> postcard::Result<()> {
+    fn push(&mut self, byte: u8) -> postcard::Result<()> {
         self.checksum.advance(byte);
         self.stuff(byte)
     }
 
     /// Adds the CRC, and ends the frame.
-    pub(super) fn finish(mut self) -> postcard::Result<&'a [u8]> {
+    fn finish(mut self) -> postcard::Result<&'a [u8]> {
         self.checksum.bytes().into_iter().try_for_each(|byte| self.stuff(byte))?;
         self.close_block()?;
         self.put(self.next_at, END)?;

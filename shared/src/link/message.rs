@@ -7,6 +7,7 @@
 //!   sequence number.
 //! - Records come by themselves, as `Telemetry` asked for.
 
+use super::input::InputRecord;
 use crate::command::{Command, Refusal};
 use crate::fault::Raised;
 use crate::identity::Identity;
@@ -89,7 +90,7 @@ pub struct Sample<const J: usize> {
     pub late: bool,
 }
 
-/// What of the telemetry is sent, and how: a bit each.
+/// What of the telemetry is sent: a bit each.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Signals(u8);
 
@@ -104,18 +105,12 @@ impl Signals {
     pub const LIMITING: Self = Self(1 << 2);
     /// Every part of a record.
     pub const ALL: Self = Self(0b111);
-    /// Records may come in the dense form.
-    pub const DENSE: Self = Self(1 << 3);
+    /// An input record of each tick that has no full one.
+    pub const INPUTS: Self = Self(1 << 3);
     /// Snapshots of the state.
     pub const STATE: Self = Self(1 << 4);
-    /// Everything, in the dense form: what a recording needs.
+    /// Everything: what a recording needs.
     pub const FULL: Self = Self(0b1_1111);
-
-    /// These without others.
-    #[must_use]
-    pub const fn without(self, others: Self) -> Self {
-        Self(self.0 & !others.0)
-    }
 
     /// These and others.
     #[must_use]
@@ -145,6 +140,28 @@ impl<const J: usize> Record<J> {
         }
         if !signals.contain(Signals::LIMITING) {
             self.limiting = List::default();
+        }
+    }
+}
+
+/// How a tick is told of.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Form {
+    /// By its record, with these signals.
+    Full(Signals),
+    /// By its input record.
+    Input,
+}
+
+impl Form {
+    /// Returns the reply that tells of a tick.
+    pub fn of<const J: usize>(self, mut record: Record<J>) -> Reply<'static, J> {
+        match self {
+            Self::Full(signals) => {
+                record.keep(signals);
+                Reply::Record(record)
+            }
+            Self::Input => Reply::Input(InputRecord::of(&record)),
         }
     }
 }
@@ -197,6 +214,8 @@ pub enum Reply<'a, const J: usize> {
     },
     /// A part of a snapshot.
     Snapshot(Part),
+    /// What a tick took in.
+    Input(InputRecord<J>),
 }
 
 impl<const J: usize> Packet<J> {
@@ -258,7 +277,7 @@ impl fmt::Display for Signals {
             (Self::COUNTS, "counts"),
             (Self::TORQUES, "torques"),
             (Self::LIMITING, "limiting"),
-            (Self::DENSE, "dense"),
+            (Self::INPUTS, "inputs"),
             (Self::STATE, "state"),
         ];
         let mut separator = "";

@@ -39,17 +39,15 @@
 
 mod checksum;
 mod frame;
-mod listener;
+mod input;
 pub mod message;
 pub mod rate;
 mod receiver;
 pub mod ring;
-mod sender;
 
 pub use frame::{encode, most_bytes};
-pub use listener::{HearError, Heard, Listener};
+pub use input::InputRecord;
 pub use receiver::{Counters, FrameError, Receiver};
-pub use sender::Sender;
 
 /// Whether a tick may take a request while there is room for so many more answers: what is done is also answered. The last
 /// place is a stop's, so that it waits for one at most behind another stop, which has done the same.

@@ -7,7 +7,7 @@ use super::reader::{Entry, What};
 use super::{RecordingError, Stamp};
 use crate::MAX_JOINTS;
 use blindgrasp_shared::estimate::{Estimator, Tracks};
-use blindgrasp_shared::link::Listener;
+use blindgrasp_shared::link::InputRecord;
 use blindgrasp_shared::link::message::Reply;
 use blindgrasp_shared::period::Period;
 use blindgrasp_shared::telemetry::{self, INTERFACE_VERSION, List};
@@ -33,9 +33,7 @@ pub struct Decoded {
     pub time_s: f64,
     /// The record.
     pub record: Record,
-    /// The digest that came with it, if it was dense.
-    pub digest: Option<u16>,
-    /// Records that are missing between the one before and this one.
+    /// Records that are missing between the one before, which may have been an input record, and this one.
     pub lost_before: u64,
     /// Joint angles, rad; empty where the hand or the counts are not known.
     pub angles_rad: List<f32, MAX_JOINTS>,
@@ -55,10 +53,14 @@ impl Decoded {
 pub enum Arrival {
     /// A record.
     Record(Box<Decoded>),
+    /// An input record, and how many records are missing before it. A replay makes of it what the tick computed.
+    Input {
+        /// Records that are missing between the one before and this one.
+        lost_before: u64,
+    },
     /// Something else that the device says.
     Reply,
-    /// Nothing that can be decoded: a dense record without a full one before it, or of another interface version, or
-    /// no reply at all.
+    /// Nothing that can be decoded: of another interface version, or no reply at all.
     Unusable,
 }
 
@@ -121,7 +123,6 @@ pub(super) struct Track {
     tracks: Tracks<MAX_JOINTS>,
     /// Records until the speed is told.
     unsettled: u32,
-    listener: Listener<MAX_JOINTS>,
     clock: Option<Clock>,
     /// Sequence number and tick of the last record.
     last: Option<(u32, u32)>,
@@ -136,7 +137,6 @@ impl Track {
             estimator: None,
             tracks: Tracks::new(),
             unsettled: 0,
-            listener: Listener::new(),
             clock: None,
             last: None,
         }
@@ -167,7 +167,6 @@ impl Track {
 
     /// Something of the recording is lost; sequence numbers tell how many records.
     pub(super) fn hole(&mut self) {
-        self.listener = Listener::new();
         self.tracks.restart();
     }
 
@@ -175,16 +174,19 @@ impl Track {
         if self.about.as_ref().is_some_and(|about| about.interface_version != INTERFACE_VERSION) {
             return Arrival::Unusable;
         }
-        match self.listener.hear(payload) {
-            Ok(heard) => match heard.reply {
-                Reply::Record(record) => self.record(record, heard.digest, arrived),
-                _ => Arrival::Reply,
-            },
+        match Reply::decode(payload) {
+            Ok(Reply::Record(record)) => Arrival::Record(Box::new(self.record(record, arrived))),
+            Ok(Reply::Input(InputRecord { sequence, tick, counts, .. })) => {
+                let record = Record { sequence, tick, counts, decimation: 1, ..Record::BLANK };
+                // Clock and estimator go on with it.
+                Arrival::Input { lost_before: self.record(record, arrived).lost_before }
+            }
+            Ok(_) => Arrival::Reply,
             Err(_) => Arrival::Unusable,
         }
     }
 
-    fn record(&mut self, record: Record, digest: Option<u16>, arrived: Stamp) -> Arrival {
+    fn record(&mut self, record: Record, arrived: Stamp) -> Decoded {
         let (sequence, tick) = (record.sequence, record.tick);
         let mut lost_before = 0;
         let mut ticks = None;
@@ -213,13 +215,12 @@ impl Track {
             arrived,
             time_s,
             record,
-            digest,
             lost_before,
             angles_rad: none(),
             speeds_rad_s: none(),
         };
         self.estimate(&mut decoded, ticks);
-        Arrival::Record(Box::new(decoded))
+        decoded
     }
 
     /// Angles and speeds. `ticks` is how many have passed since the record before, if that is known.

@@ -53,7 +53,7 @@ pub struct LinkStatus {
     /// Frames that came damaged, each of which may have been a record.
     #[prost(uint64, tag = "4")]
     pub damaged: u64,
-    /// Records that came and could be decoded.
+    /// Records that came and could be decoded, input records among them.
     #[prost(uint64, tag = "5")]
     pub records: u64,
     /// Records that are missing, by the numbers of those that came.
@@ -62,18 +62,21 @@ pub struct LinkStatus {
     /// Records and answers that the device lost because a queue was full.
     #[prost(uint64, tag = "7")]
     pub dropped: u64,
-    /// Frames that came whole and can't be decoded. Of records, those until a full one comes; they are among the missing.
+    /// Frames that came whole and can't be decoded.
     #[prost(uint64, tag = "8")]
     pub unusable: u64,
     /// Decoded records a second.
     #[prost(double, tag = "9")]
     pub rate_hz: f64,
-    /// Ticks from one sent record to the next, as the device told last.
+    /// Ticks from one record that was asked for to the next, as the device told last; 1 with input records.
     #[prost(uint32, tag = "10")]
     pub decimation: u32,
     /// Share of the line's time that the frames took; NaN where its speed is not known.
     #[prost(double, tag = "11")]
     pub share: f64,
+    /// Input records that came, of which a replay makes full ones.
+    #[prost(uint64, tag = "12")]
+    pub inputs: u64,
 }
 
 impl LinkStatus {

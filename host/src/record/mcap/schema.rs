@@ -121,13 +121,14 @@ signals! {
     BYTES               =  2, "bytes",                Uint64, "bytes",  "Bytes of the good frames that came";
     FRAMES              =  3, "frames",               Uint64, "",       "Good frames that came";
     DAMAGED             =  4, "damaged",              Uint64, "",       "Frames that came damaged, each of which may have been a record";
-    RECORDS             =  5, "records",              Uint64, "",       "Records that came and could be decoded";
+    RECORDS             =  5, "records",              Uint64, "",       "Records that came and could be decoded, input records among them";
     MISSING             =  6, "missing",              Uint64, "",       "Records that are missing, by the numbers of those that came";
     DROPPED             =  7, "dropped",              Uint64, "",       "Records and answers that the device lost because a queue was full";
-    UNUSABLE            =  8, "unusable",             Uint64, "",       "Frames that came whole and can't be decoded; of records, those until a full one comes (among the missing)";
+    UNUSABLE            =  8, "unusable",             Uint64, "",       "Frames that came whole and can't be decoded";
     RATE_HZ             =  9, "rate_hz",              Double, "1/s",    "Decoded records a second";
-    DECIMATION          = 10, "decimation",           Uint32, "ticks",  "Ticks from one sent record to the next, as the device told last";
+    DECIMATION          = 10, "decimation",           Uint32, "ticks",  "Ticks from one record that was asked for to the next; 1 where input records tell of the ticks between, as the device told last";
     SHARE               = 11, "share",                Double, "1",      "Share of the line's time that the frames took; NaN where its speed is not known";
+    INPUTS              = 12, "inputs",               Uint64, "",       "Input records that came, of which a replay makes full ones";
 }
 
 /// A name that protobuf takes for a field: letters, digits, underscores.

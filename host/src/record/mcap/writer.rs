@@ -248,6 +248,12 @@ impl Writer {
         recorded.status.bytes += most_bytes(payload.len()) as u64;
         match &arrival {
             Arrival::Record(decoded) => self.tick(device, decoded)?,
+            Arrival::Input { lost_before } => {
+                self.records += 1;
+                recorded.status.records += 1;
+                recorded.status.inputs += 1;
+                recorded.status.missing += lost_before;
+            }
             Arrival::Reply => {}
             Arrival::Unusable => recorded.status.unusable += 1,
         }

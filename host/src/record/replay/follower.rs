@@ -12,7 +12,6 @@ use crate::{MAX_FINGERS, MAX_JOINTS};
 use blindgrasp_shared::command::Refusal;
 use blindgrasp_shared::supervisor::Mode;
 use blindgrasp_shared::telemetry::INTERFACE_VERSION;
-use blindgrasp_shared::telemetry::dense::{digest, quantised};
 use blindgrasp_shared::telemetry::snapshot::{BYTES_PER_JOINT, Collector, Part};
 use blindgrasp_shared::tick::{Config, Input, Sensed, State, tick};
 use std::collections::VecDeque;
@@ -547,6 +546,16 @@ impl Follower {
     /// Compares a tick, but for what only its sender knows.
     fn compare(&mut self, told: &Told, computed: Record) {
         let record = &told.record;
+        let tick = i64::from(record.tick);
+        if let Some(told) = told.digest {
+            let computed = computed.digest();
+            if computed != told {
+                let words = |digest: u32| Value::Words(format!("{digest:#010x}"));
+                let what = "digest of all that the tick computed";
+                self.comparison.differs(tick, what, None, words(told), words(computed));
+            }
+            return;
+        }
         let mut computed = Record {
             sequence: record.sequence,
             cycles: record.cycles,
@@ -560,21 +569,7 @@ impl Follower {
         if record.limiting.as_slice().is_empty() {
             computed.limiting = Default::default();
         }
-        let tick = i64::from(record.tick);
-        match told.digest {
-            None => {
-                self.comparison.records(tick, record, &computed);
-            }
-            Some(told_digest) => {
-                let same = self.comparison.records(tick, record, &quantised(&computed));
-                let computed = digest(&computed);
-                if same && computed != told_digest {
-                    let words = |digest: u16| Value::Words(format!("{digest:#06x}"));
-                    let what = "digest of the exact torques and monitors";
-                    self.comparison.differs(tick, what, None, words(told_digest), words(computed));
-                }
-            }
-        }
+        self.comparison.records(tick, record, &computed);
     }
 }
 

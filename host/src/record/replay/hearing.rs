@@ -4,7 +4,7 @@ use crate::MAX_JOINTS;
 use crate::record::mcap::{About, Entry, Setting, Stamp, What};
 use crate::wire::{Packet, Record, Request};
 use blindgrasp_shared::command::Refusal;
-use blindgrasp_shared::link::Listener;
+use blindgrasp_shared::link::InputRecord;
 use blindgrasp_shared::link::message::Reply;
 use blindgrasp_shared::telemetry::snapshot::Part;
 
@@ -45,20 +45,19 @@ pub struct Told {
     pub time_s: f64,
     /// The record.
     pub record: Record,
-    /// The digest that stands for what a dense record leaves out; full ones leave out nothing.
-    pub digest: Option<u16>,
+    /// Of an input record, the digest of what it leaves out: all that the tick computed.
+    pub digest: Option<u32>,
 }
 
 /// Turns entries of one device into items.
 pub struct Hearing {
-    listener: Listener<MAX_JOINTS>,
     start_ns: u64,
 }
 
 impl Hearing {
     /// Of a recording that begins at this time.
     pub fn new(start_ns: u64) -> Self {
-        Self { listener: Listener::new(), start_ns }
+        Self { start_ns }
     }
 
     /// Time since the beginning of the recording, s.
@@ -67,36 +66,38 @@ impl Hearing {
     }
 
     /// Takes the next entry. What is lost shows by the ticks that are missing.
-    pub fn take(&mut self, entry: Entry) -> Option<Item> {
+    pub fn take(&self, entry: Entry) -> Option<Item> {
         let time_s = self.seconds(entry.at);
         match entry.what {
-            What::About(about) => {
-                self.listener = Listener::new();
-                Some(Item::Session(about))
-            }
+            What::About(about) => Some(Item::Session(about)),
             What::Parameters(settings) => Some(Item::Parameters(settings)),
             What::Sent(payload) => asked(&payload),
-            What::Received(payload) => self.heard(time_s, &payload),
-            What::Gap { words } => {
-                self.listener = Listener::new();
-                Some(Item::Cut(words))
-            }
-            What::Hole { .. } => {
-                self.listener = Listener::new();
-                None
-            }
-            What::Event { .. } | What::Link(_) | What::Tick(_) => None,
+            What::Received(payload) => heard(time_s, &payload),
+            What::Gap { words } => Some(Item::Cut(words)),
+            What::Hole { .. } | What::Event { .. } | What::Link(_) | What::Tick(_) => None,
         }
     }
+}
 
-    fn heard(&mut self, time_s: f64, payload: &[u8]) -> Option<Item> {
-        let heard = self.listener.hear(payload).ok()?;
-        match heard.reply {
-            Reply::Record(record) => Some(Item::Record(Told { time_s, record, digest: heard.digest })),
-            Reply::Snapshot(part) => Some(Item::Part(part)),
-            Reply::Answer { sequence, refused } => Some(Item::Answered { sequence, refused }),
-            _ => None,
+fn heard(time_s: f64, payload: &[u8]) -> Option<Item> {
+    match Reply::<MAX_JOINTS>::decode(payload).ok()? {
+        Reply::Record(record) => Some(Item::Record(Told { time_s, record, digest: None })),
+        Reply::Input(InputRecord { sequence, tick, answer, events, reading_failed, counts, digest }) => {
+            let record = Record {
+                sequence,
+                tick,
+                answer,
+                events,
+                reading_failed,
+                counts,
+                decimation: 1,
+                ..Record::BLANK
+            };
+            Some(Item::Record(Told { time_s, record, digest: Some(digest) }))
         }
+        Reply::Snapshot(part) => Some(Item::Part(part)),
+        Reply::Answer { sequence, refused } => Some(Item::Answered { sequence, refused }),
+        _ => None,
     }
 }
 

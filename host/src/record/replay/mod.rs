@@ -3,7 +3,7 @@
 //! The hand is made anew from its recorded file, its parameters from those that were in force, and its state from the
 //! snapshots that the device sent, or from nothing where the recording begins with the device's first tick. Every
 //! recorded tick's counts, events and command then go through the same `tick`, and what comes out is compared with the
-//! record: all bits of a full record, all bits that were sent of a dense one and the digest of the others.
+//! record: all bits of a full record, the digest of all bits of an input record.
 //!
 //! ```text
 //! entries --> Hearing: payloads to items --> Follower: state, tick, compare --> Report
@@ -205,7 +205,7 @@ pub fn replay<E: Iterator<Item = Result<Entry, RecordingError>> + Send>(
     thread::scope(|scope| {
         let (sender, receiver) = mpsc::sync_channel::<Vec<Item>>(BATCHES);
         let heard = scope.spawn(move || -> Result<(), RecordingError> {
-            let mut hearing = Hearing::new(start_ns);
+            let hearing = Hearing::new(start_ns);
             let mut batch = Vec::with_capacity(BATCH);
             while let Some(entry) = entries.next() {
                 let entry = entry?;

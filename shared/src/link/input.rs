@@ -1,0 +1,116 @@
+//! The input record of a tick: all that the tick took in, and a digest of what it computed from that.
+//!
+//! It is what a line gets that is too slow for every record in full. A host that knows the state of the controller computes
+//! the rest as the controller did, and the digest says that every bit of it is the same. Each stands for itself: nothing has
+//! to be known of others to read it.
+
+use super::checksum::Checksum;
+use crate::command::Answer;
+use crate::event::Events;
+use crate::fault::Raised;
+use crate::telemetry::{List, Record};
+use postcard::ser_flavors::Flavor;
+use serde::{Deserialize, Serialize};
+
+/// What a tick took in, and the [`digest`](Record::digest) of its record.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct InputRecord<const J: usize> {
+    /// Number of the record, in one row with full ones.
+    pub sequence: u32,
+    /// Number of the tick since the start, wrapping.
+    pub tick: u32,
+    /// The command of this tick, and what became of it.
+    pub answer: Option<Answer>,
+    /// What else came from outside in this tick.
+    pub events: Events,
+    /// Why there are no counts, where the joints could not be read.
+    pub reading_failed: Option<Raised>,
+    /// Encoder counts, one a joint.
+    pub counts: List<i32, J>,
+    /// Of everything that the tick computed.
+    pub digest: u32,
+}
+
+impl<const J: usize> InputRecord<J> {
+    /// Returns that of a tick's record.
+    pub fn of(record: &Record<J>) -> Self {
+        let &Record { sequence, tick, answer, events, reading_failed, counts, .. } = record;
+        Self { sequence, tick, answer, events, reading_failed, counts, digest: record.digest() }
+    }
+}
+
+impl<const J: usize> Record<J> {
+    /// Returns the CRC-32 of the record's bytes (that of the frames), with 0 for all that the tick does not compute:
+    /// `sequence`, `cycles`, `dropped` and `decimation`.
+    pub fn digest(&self) -> u32 {
+        let computed = Self { sequence: 0, cycles: 0, dropped: 0, decimation: 0, ..self.clone() };
+        // The digest takes every byte, so this can't fail.
+        postcard::serialize_with_flavor(&computed, Digest(Checksum::START)).unwrap_or(0)
+    }
+}
+
+/// Takes bytes into a CRC.
+struct Digest(Checksum);
+
+impl Flavor for Digest {
+    type Output = u32;
+
+    fn try_push(&mut self, byte: u8) -> postcard::Result<()> {
+        self.0.advance(byte);
+        Ok(())
+    }
+
+    fn finalize(self) -> postcard::Result<u32> {
+        Ok(u32::from_le_bytes(self.0.bytes()))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::fault::Fault;
+    use crate::limit::{Limit, Limiting};
+    use crate::link::message::{Form, Reply};
+    use crate::supervisor::Mode;
+
+    fn record() -> Record<3> {
+        Record {
+            tick: 70_000,
+            counts: List::first_of([0, -1, 21_600], 3),
+            torques_nm: List::first_of([0.5, -1.25, 0.0], 3),
+            limiting: List::first_of([Limiting::NONE; 3], 3),
+            ..Record::BLANK
+        }
+    }
+
+    /// What a host finds when it computes the tick again, it finds by the digest; what only the sender knows is not in it.
+    #[test]
+    fn every_bit_that_a_tick_computes_is_in_the_digest() {
+        let whole = record();
+        let mut limited = Limiting::NONE;
+        limited.insert(Limit::Slew);
+        for computed in [
+            Record { tick: 70_001, ..record() },
+            Record { mode: Mode::Armed, ..record() },
+            Record { fault: Some(Raised::of_hand(Fault::LinkLost)), ..record() },
+            Record { work_j: f32::from_bits(1), ..record() },
+            Record { excess_j: -0.0, ..record() },
+            Record { late_ticks: 1, ..record() },
+            Record { counts: List::first_of([0, -1, 21_601], 3), ..record() },
+            Record { torques_nm: List::first_of([0.5, -1.25, -0.0], 3), ..record() },
+            Record { limiting: List::first_of([Limiting::NONE, limited, Limiting::NONE], 3), ..record() },
+        ] {
+            assert_ne!(computed.digest(), whole.digest(), "{computed:?}");
+        }
+        let sent = Record { sequence: 9, cycles: 9, dropped: 9, decimation: 9, ..record() };
+        assert_eq!(sent.digest(), whole.digest());
+    }
+
+    #[test]
+    fn each_stands_for_itself() {
+        let mut buffer = [0; 64];
+        let reply = Form::Input.of(record());
+        let bytes = postcard::to_slice(&reply, &mut buffer).unwrap();
+        assert_eq!(Reply::decode(bytes), Ok(reply));
+    }
+}
