@@ -426,20 +426,6 @@ REPLY = Enum(
 ANY_IDENTITY = Struct(reply=Known([0]), sequence=U16, session=U16, interface_version=U16)
 
 
-# Law and ledger.
-MONITORS = [
-    "force_n",
-    "attitude_stiffness_nm",
-    "integral_gain_nm_rad",
-    "approach_potential_j",
-    "attitude_potential_j",
-    "integral_potential_j",
-    "work_j",
-    "damped_j",
-    "excess_j",
-]
-
-
 class Refused(Trouble):
     """A request that was refused, and why."""
 
@@ -462,7 +448,8 @@ MONITORS = [
     for field, names in [("gains", GAINS), ("potentials_j", GAINS), ("law_signals", LAW_SIGNALS)]
     for law, of_law in names.items()
     for k in range(len(of_law))
-] + [(field,) for field in ("work_j", "damped_j", "excess_j")]
+] + [(field,) for field, kind in RECORD_FIELDS if kind == "f32"]
+COUNTERS = [field for field, kind in RECORD_FIELDS if kind in ("u16", "u32") and field not in ("sequence", "tick")]
 
 
 def at(record, path):
@@ -854,7 +841,7 @@ def csv_line(record):
     fault = record["fault"] or {"fault": 0, "joint": None}
     head = [record[name] for name in ("sequence", "tick", "mode")] + [fault["fault"], fault["joint"], record["events"]]
     head += [at(record, path) for path in MONITORS]
-    head += [record[name] for name in ("cycles", "late_ticks", "dropped", "decimation")]
+    head += [record[name] for name in COUNTERS]
     cells = head + record["counts"] + record["torques_nm"] + record["limiting"]
     return ",".join("" if cell is None else f"{cell:.9g}" if isinstance(cell, float) else str(cell) for cell in cells)
 
@@ -863,7 +850,7 @@ def csv_head(record):
     names = ["sequence", "tick", "mode", "fault", "fault_joint", "events"]
     tables = [GAINS, POTENTIALS, LAW_SIGNALS]
     names += [name for table in tables for of_law in table.values() for name in of_law]
-    names += ["work_j", "damped_j", "excess_j", "cycles", "late_ticks", "dropped", "decimation"]
+    names += [path[0] for path in MONITORS if len(path) == 1] + COUNTERS
     parts = [("counts", "count_{}"), ("torques_nm", "torque_{}_nm"), ("limiting", "limiting_{}")]
     return ",".join(names + [name.format(k) for part, name in parts for k in range(len(record[part]))])
 
