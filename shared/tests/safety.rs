@@ -1,0 +1,206 @@
+//! What no request can do: make a limit looser than the hand's file, arm without a heartbeat, make a torque jump, leave a fault
+//! by itself.
+
+mod common;
+
+use blindgrasp_shared::command::{Command, Grasp};
+use blindgrasp_shared::control::PerGain;
+use blindgrasp_shared::device::{Device, Inputs, Reading};
+use blindgrasp_shared::fault::{Fault, Raised};
+use blindgrasp_shared::identity::{Clock, Identity, Image};
+use blindgrasp_shared::link::message::{Packet, Reply, Request, Signals};
+use blindgrasp_shared::parameters::{Bound, Parameter};
+use blindgrasp_shared::supervisor::Mode;
+use blindgrasp_shared::telemetry::INTERFACE_VERSION;
+use blindgrasp_shared::telemetry::burst::Burst;
+use blindgrasp_shared::tick::Params;
+use common::{JOINTS, config, facing_counts, params};
+use proptest::prelude::*;
+
+type HandParams = Params<12, 3>;
+
+/// The hand of the tests, with every limit and fault switched on.
+fn hand() -> HandParams {
+    let mut config = config();
+    config.faults.heartbeat_ms = Some(100);
+    config.supervisor.amplifier_start_ms = 5;
+    params(&config)
+}
+
+/// Values that a host may send: near what is there, far from it, and nonsense.
+fn values() -> impl Strategy<Value = f32> {
+    let odd =
+        [0.0, -0.0, 1.0, f32::MAX, f32::MIN, f32::MIN_POSITIVE, f32::NAN, f32::INFINITY, 1e9, 0.999_999];
+    prop_oneof![
+        any::<f32>(),
+        0.0..2.0_f32,
+        (0..1000_u32).prop_map(|n| n as f32),
+        proptest::sample::select(odd.to_vec())
+    ]
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(300))]
+
+    /// The torque at an amplifier is at most `limits.torque_nm`, the last thing but the slew limit that acts on it, and no
+    /// sequence of `set` makes that, or any other limit, looser than the file's. What is refused changes nothing.
+    #[test]
+    fn no_sequence_of_sets_is_looser_than_the_file(
+        sets in proptest::collection::vec((0..Parameter::COUNT, 0..14_u8, values(), any::<bool>()), 1..200)
+    ) {
+        let mut params = hand();
+        let file = params.clone();
+        for (number, index, value, scaled) in sets {
+            let parameter = Parameter::ALL[number];
+            // Half of them close to what is there, so that they are taken.
+            let value = match params.get(parameter, index) {
+                Ok(setting) if scaled => setting.value * value,
+                _ => value,
+            };
+            let before = *params.config();
+            let done = params.set(parameter, index, value);
+            if done.is_err() {
+                prop_assert_eq!(*params.config(), before, "{} was refused and changed something", parameter);
+            } else {
+                prop_assert!(value.is_finite());
+            }
+        }
+        let mut changed = 0;
+        for parameter in Parameter::ALL {
+            for index in 0..parameter.count(JOINTS) {
+                let now = params.get(parameter, index).unwrap();
+                let then = file.get(parameter, index).unwrap();
+                prop_assert_eq!(now.file.to_bits(), then.value.to_bits());
+                match parameter.bound() {
+                    Bound::Free => {}
+                    Bound::AtMost => prop_assert!(now.value <= then.value, "{} {}", parameter, now.value),
+                    Bound::AtLeast => prop_assert!(now.value >= then.value, "{} {}", parameter, now.value),
+                }
+                if now.value != then.value {
+                    changed |= 1 << parameter.number();
+                }
+            }
+        }
+        prop_assert_eq!(params.changed(), changed, "what differs from the file is told");
+        // A gain is bounded by its limit, which is bounded by the file.
+        for (gain, limit) in params.config().laws.gains.iter().zip(file.config().limits.gains.iter()) {
+            prop_assert!(*gain <= limit.unwrap());
+        }
+    }
+}
+
+/// Repeatable random numbers.
+struct Random(u64);
+
+impl Random {
+    fn below(&mut self, most: u32) -> u32 {
+        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (self.0 >> 33) as u32 % most
+    }
+
+    fn request(&mut self) -> Request<12> {
+        let mut gains =
+            || [None, Some(self.below(1000) as f32 * 0.6), Some(f32::NAN)][self.below(3) as usize];
+        let grasp = Grasp { gains: PerGain { grasp: [gains(), gains()], integral: [gains()] } };
+        let value = [0.5, 1.0, 20.0, 1e9, f32::NAN][self.below(5) as usize];
+        let parameter = Parameter::ALL[self.below(Parameter::COUNT as u32) as usize];
+        let index = self.below(13) as u8;
+        match self.below(40) {
+            0 => Request::Hello { interface_version: INTERFACE_VERSION },
+            1..=8 => Request::Heartbeat,
+            9..=13 => Request::Command(Command::Arm),
+            14..=17 => Request::Command(Command::Grasp(Grasp::CONFIGURED)),
+            18..=20 => Request::Command(Command::Grasp(grasp)),
+            21 | 22 => Request::Command(Command::Release),
+            23 => Request::Command(Command::Disarm),
+            24 => Request::Command(Command::Stop),
+            25..=28 => Request::Command(Command::ClearFault),
+            29..=32 => Request::SetParameter { parameter, index, value },
+            33 => Request::GetParameter { parameter, index },
+            34 => Request::Telemetry { decimation: 1, signals: Signals::FULL },
+            35 => Request::Goodbye,
+            36 => Request::Rate { baud: 3_000_000 },
+            _ => Request::Burst { index: index.into() },
+        }
+    }
+}
+
+/// A million requests in whatever order, by a host that now and then loses its session, of a hand whose joints jitter and now
+/// and then fail: nothing is armed without a heartbeat, no torque changes by more than its slew limit while there is power,
+/// there is none without, and a fault is left by a `ClearFault` that was taken and by nothing else.
+#[test]
+fn a_million_requests_do_no_harm() {
+    let image = Image {
+        interface_version: INTERFACE_VERSION,
+        kind: "hand",
+        hand: "test",
+        hand_hash: 0,
+        firmware_version: "0.0.0",
+        build_hash: 0,
+        joint_count: 12,
+        fingertip_count: 3,
+        period_us: 1000,
+    };
+    let params = hand();
+    let (heartbeat_ms, slew_nm) = (100, params.file().limits.slew_nm_s.unwrap().map(|slew| slew * 1e-3));
+    let mut device = Device::new(params, Identity::of(image, Clock::External));
+    let mut burst = Box::new(Burst::new());
+    let mut random = Random(1);
+    let (mut session, mut sequence) = (0_u16, 0_u16);
+    let (mut mode, mut torques_nm, mut powered) = (Mode::Disarmed, [0.0_f32; 12], false);
+    let mut silent = u32::MAX;
+    let (mut armed, mut grasped, mut faults, mut cleared) = (0, 0, 0, 0);
+    // Not optimised, a tick takes forty times as long.
+    let requests = if cfg!(debug_assertions) { 50_000 } else { 1_000_000 };
+    for _ in 0..requests {
+        sequence = sequence.wrapping_add(1);
+        let request = random.request();
+        let wrong = random.below(50) == 0;
+        let session_sent = if wrong { session.wrapping_add(7) } else { session };
+        let counts = facing_counts().map(|count: i32| count + random.below(3) as i32);
+        let reading = match random.below(3000) {
+            0 => Reading::Failed(Raised::at(3, Fault::SampleMissing)),
+            _ => Reading::Counts(counts),
+        };
+        let packet = Some(Packet { session: session_sent, sequence, request: request.clone() });
+        let late = random.below(200) == 0;
+        let inputs = Inputs { reading, late, supply_low: false, cycles: 0, dropped: 0, waiting: 0, packet };
+        let outputs = device.tick(&inputs, &mut burst);
+        let done = match outputs.reply {
+            Some(Reply::Identity { session: begun, .. }) => {
+                session = begun;
+                false
+            }
+            Some(Reply::Answer { refused, .. }) => refused.is_none(),
+            _ => false,
+        };
+        silent = if request == Request::Heartbeat && done { 0 } else { silent.saturating_add(1) };
+        let now = outputs.record.mode;
+        if mode == Mode::Disarmed && now == Mode::Armed {
+            assert!(silent <= heartbeat_ms, "armed {silent} ticks after the last heartbeat");
+            assert!(done && request == Request::Command(Command::Arm), "armed by {request:?}");
+            armed += 1;
+        }
+        if mode == Mode::Fault && now != Mode::Fault {
+            let by = request == Request::Command(Command::ClearFault) && done && !wrong;
+            assert!(by && now == Mode::Disarmed, "a fault was left by {request:?} for {now:?}");
+            cleared += 1;
+        }
+        faults += u32::from(mode != Mode::Fault && now == Mode::Fault);
+        grasped += u32::from(mode == Mode::Armed && now == Mode::Grasping);
+        assert_eq!(outputs.powered, !matches!(now, Mode::Disarmed | Mode::Fault));
+        for ((now_nm, before_nm), most) in outputs.torques_nm.iter().zip(torques_nm).zip(slew_nm) {
+            if !outputs.powered {
+                assert_eq!(*now_nm, 0.0);
+            } else if powered {
+                // A rounding of the sum of the last torque and the step.
+                assert!((now_nm - before_nm).abs() <= most * 1.000_01, "{before_nm} to {now_nm} N m");
+            } else {
+                assert!(now_nm.abs() <= most * 1.000_01, "{now_nm} N m in the first tick with power");
+            }
+        }
+        (mode, torques_nm, powered) = (now, outputs.torques_nm, outputs.powered);
+    }
+    println!("{requests} requests: armed {armed}, grasped {grasped}, faults {faults}, cleared {cleared}");
+    assert!(armed > requests / 2000 && grasped > requests / 5000 && faults > 10 && cleared > 10);
+}
