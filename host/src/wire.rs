@@ -2,9 +2,11 @@
 
 use crate::MAX_JOINTS;
 use blindgrasp_shared::command::Refusal;
+use blindgrasp_shared::control::{GAIN_COUNT, Signal};
 use blindgrasp_shared::identity::{BrownOut, Clock, Crash, Identity, ResetCause};
 use blindgrasp_shared::link::message;
 use blindgrasp_shared::parameters::Setting;
+use blindgrasp_shared::signals::Value;
 use blindgrasp_shared::telemetry::{self, INTERFACE_VERSION};
 
 /// A request with its session and number.
@@ -114,4 +116,28 @@ pub(crate) fn in_words(packet: Option<&Packet>) -> String {
         Request::Goodbye => "goodbye".to_owned(),
         Request::Rate { baud } => format!("a line of {baud} baud"),
     }
+}
+
+/// What a record tells of the whole hand in numbers that are worth a plot, in the order of the table of signals: real ones, and
+/// the time that the tick took.
+pub fn scalars(record: &Record) -> Vec<(Signal, f32)> {
+    let mut scalars = Vec::with_capacity(16);
+    record.tell(|told| match told.value {
+        Value::Real(value) => scalars.push((told.signal, value)),
+        Value::Whole(cycles) if told.signal.unit == "cycles" => scalars.push((told.signal, cycles as f32)),
+        _ => {}
+    });
+    scalars
+}
+
+/// The scalars that are potentials of the laws: behind their gains.
+pub const fn potentials() -> std::ops::Range<usize> {
+    GAIN_COUNT..2 * GAIN_COUNT
+}
+
+/// A signal's name for readers: without the unit at its end, and with spaces.
+pub fn label(signal: &Signal) -> String {
+    let unit: String = signal.unit.to_lowercase().replace(' ', "").replace('/', "_");
+    let bare = signal.key.strip_suffix(&unit).and_then(|key| key.strip_suffix('_'));
+    bare.filter(|_| !unit.is_empty()).unwrap_or(signal.key).replace('_', " ")
 }

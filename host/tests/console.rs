@@ -617,7 +617,7 @@ mod command {
             "grasp: refused, the hand is disarmed: arm it first",
             "limits.torque_nm[0] = 0.05: done",
             "limits.torque_nm[11] = 0.05: done",
-            "limits.torque_nm[3] = 0.05  (Largest torque of a joint, N m)",
+            "limits.torque_nm[3] = 0.05  (Largest torque of a joint, N m; at most 1.3878",
             "damping_nm_s[200]: refused, this hand has no parameter with this index",
             "arm: done",
             "force_n = 1: refused, parameters and the line's rate are set while the hand is disarmed",

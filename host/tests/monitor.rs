@@ -20,6 +20,8 @@ use tempfile::TempDir;
 const BLINDGRASP: &str = env!("CARGO_BIN_EXE_blindgrasp");
 /// How long anything may take: machines that do a lot else are slow.
 const PATIENCE: Duration = Duration::from_secs(30);
+/// The file of a hand that is served, beside its port.
+const PATIENT: &str = "patient.toml";
 const ROWS: u16 = 30;
 const COLUMNS: u16 = 100;
 
@@ -38,8 +40,12 @@ impl Hand {
     fn serve_with(folder: &TempDir, arguments: &[&str]) -> Self {
         let port = folder.path().join("hand");
         let _ = std::fs::remove_file(&port);
+        let is_patient = std::env::var_os("BLINDGRASP_BLESS").is_none();
+        let scene = if is_patient { Self::patient(folder) } else { "cube".into() };
         let mut child = Command::new(BLINDGRASP)
-            .args(["serve", "cube", "--link"])
+            .arg("serve")
+            .arg(scene)
+            .arg("--link")
             .arg(&port)
             .args(arguments)
             .stdout(Stdio::piped())
@@ -50,25 +56,26 @@ impl Hand {
         let stdout = child.stdout.as_mut().expect("stdout");
         BufReader::new(stdout).read_line(&mut line).expect("it says its port");
         assert!(line.starts_with("port "), "{line}");
-        let hand = Self { child, port };
-        if std::env::var_os("BLINDGRASP_BLESS").is_none() {
-            hand.be_patient();
-        }
-        hand
+        Self { child, port }
     }
 
-    /// Lets the heartbeat fail for a second, as it may on a machine that does a lot else.
-    fn be_patient(&self) {
-        let mut console = Command::new(BLINDGRASP)
-            .args(["console", "--port", text(&self.port)])
-            .stdin(Stdio::piped())
-            .stdout(Stdio::piped())
-            .spawn()
-            .expect("the command starts");
-        console.stdin.take().expect("stdin").write_all(b"set faults.heartbeat_ms 1000\n").expect("a line");
-        let output = console.wait_with_output().expect("the command ends");
-        let said = String::from_utf8_lossy(&output.stdout);
-        assert!(said.contains("faults.heartbeat_ms = 1000: done"), "{said}");
+    /// A scene whose hand lets the heartbeat fail for a second, as it may on a machine that does a lot else.
+    fn patient(folder: &TempDir) -> PathBuf {
+        let models = Path::new(env!("CARGO_MANIFEST_DIR")).join("../models");
+        let read = |file: &str| std::fs::read_to_string(models.join(file)).expect("a model");
+        let hand = read("hands/three-finger.toml") + "\n[safety]\nheartbeat_ms = 1000\n";
+        std::fs::write(folder.path().join(PATIENT), hand).expect("a file");
+        let scene =
+            read("scenes/cube.toml").replacen("hand = \"three-finger\"", &format!("hand = \"{PATIENT}\""), 1);
+        let path = folder.path().join("scene.toml");
+        std::fs::write(&path, scene).expect("a file");
+        path
+    }
+
+    /// The arguments that tell a monitor of such a hand, at a port in the same folder.
+    fn known(port: &str) -> Vec<String> {
+        let hand = Path::new(port).with_file_name(PATIENT);
+        if hand.exists() { vec!["--hand".into(), text(&hand).into()] } else { Vec::new() }
     }
 }
 
@@ -102,6 +109,12 @@ impl Terminal {
         let child = blocking::Command::new(BLINDGRASP)
             .arg("monitor")
             .args(arguments)
+            .args(
+                arguments
+                    .windows(2)
+                    .find(|pair| pair[0] == "--port")
+                    .map_or(Vec::new(), |pair| Hand::known(pair[1])),
+            )
             .env("TERM", "xterm-256color")
             .env_remove("NO_COLOR")
             .envs(environment.iter().copied())
@@ -329,6 +342,7 @@ fn a_terminal_that_is_gone_ends_it_and_stops_the_hand() {
     pty.resize(Size::new(ROWS, COLUMNS)).expect("a size");
     let mut child = blocking::Command::new(BLINDGRASP)
         .args(["monitor", "--port", text(&hand.port)])
+        .args(Hand::known(text(&hand.port)))
         .env("TERM", "xterm-256color")
         .spawn(pts)
         .expect("the command starts");

@@ -60,7 +60,7 @@ pub struct Turned {
     /// What the law's damping took of it, J.
     pub damped_j: f32,
     /// Work of the last second beyond the drop of the potentials, J.
-    pub excess_j: f32,
+    pub excess: f32,
     /// The mode.
     pub mode: Mode,
     /// The fault that the hand is in.
@@ -105,7 +105,7 @@ impl Controller for Supervised {
                 potentials_j: record.potentials_j,
                 work_j: record.work_j,
                 damped_j: record.damped_j,
-                excess_j: record.excess_j,
+                excess: record.excess_j,
                 mode: record.mode,
                 fault: record.fault,
             });

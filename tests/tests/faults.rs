@@ -378,7 +378,7 @@ fn swings_up() -> Row {
         let limit_j = f64::from(config(&scene).faults.energy_j.expect("it is watched"));
         let outcome = run(&scene, &Course::default());
         let at = found(&outcome, Fault::TooMuchEnergy, None);
-        let so = true_excess_j(&scene, &outcome).iter().position(|&excess_j| excess_j > limit_j);
+        let so = true_excess_j(&scene, &outcome).iter().position(|&beyond_j| beyond_j > limit_j);
         // Counted turns and the mean of two torques may tell of it a little before.
         let since = so.map_or(at, |since| at.min(since as u64));
         row.add(since, at, &falls_off(&scene, None, &outcome, at));
@@ -715,9 +715,9 @@ fn a_reversed_motor_is_not_seen_by_its_work() {
     let mut fallen = 0;
     for joint in 0..JOINTS {
         let outcome = run(&scene, &Course { reversed_motors: vec![(500, joint)], ..Course::default() });
-        let excess_j = largest(outcome.turned[500..].iter().map(|turned| f64::from(turned.excess_j)));
+        let beyond_j = largest(outcome.turned[500..].iter().map(|turned| f64::from(turned.excess)));
         let limit_j = config(&scene).faults.energy_j.map_or(f64::INFINITY, f64::from);
-        assert!(excess_j < 0.1 * limit_j, "joint {joint}: {excess_j} J of {limit_j} J");
+        assert!(beyond_j < 0.1 * limit_j, "joint {joint}: {beyond_j} J of {limit_j} J");
         assert!(outcome.found().is_none_or(|(_, raised)| raised.fault != Fault::TooMuchEnergy));
         if !outcome.run.summary.grasp_held {
             fallen += 1;

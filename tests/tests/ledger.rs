@@ -65,7 +65,7 @@ fn the_work_is_that_of_the_motors_and_the_books_close() {
 
 /// What excess a tick adds, from the records of the last and of this one, J.
 fn added_j(last: &Turned, now: &Turned, period_s: f64) -> f64 {
-    let [last_j, now_j] = [last.excess_j, now.excess_j].map(f64::from);
+    let [last_j, now_j] = [last.excess, now.excess].map(f64::from);
     now_j - last_j * (1.0 - period_s)
 }
 
@@ -150,7 +150,7 @@ fn held(scene: &Scene, course: &Course) -> Option<f64> {
     // What that watch does about hands that are pushed is looked at elsewhere.
     config.faults.frozen_ms = None;
     let outcome = run_with(scene, &config, course);
-    let most = outcome.turned.iter().map(|turned| f64::from(turned.excess_j)).fold(0.0, f64::max);
+    let most = outcome.turned.iter().map(|turned| f64::from(turned.excess)).fold(0.0, f64::max);
     (outcome.run.summary.grasp_held && outcome.found().is_none()).then_some(most)
 }
 
@@ -216,7 +216,7 @@ fn the_excess_tells_a_hand_that_swings_up() {
             assert!(!outcome.run.summary.grasp_held, "{name}, {setting}");
             let truth_j = true_excess_j(&scene, &outcome);
             let so = truth_j.iter().position(|&excess_j| excess_j > limit_j);
-            most_j = outcome.turned.iter().map(|turned| f64::from(turned.excess_j)).fold(most_j, f64::max);
+            most_j = outcome.turned.iter().map(|turned| f64::from(turned.excess)).fold(most_j, f64::max);
             words.push(match outcome.found() {
                 Some((at, raised)) => {
                     assert_eq!(raised, Raised::of_hand(Fault::TooMuchEnergy));

@@ -200,7 +200,6 @@ fn faulted() -> AnyRecord {
         law_signals: PerSignal::all(0.0),
         work_j: -0.5,
         damped_j: 0.03125,
-        excess_j: 0.0625,
         cycles: 20_000,
         late_ticks: 2,
         dropped: 1,
@@ -208,6 +207,7 @@ fn faulted() -> AnyRecord {
         counts: counts(&[0, -1, 21_600]),
         torques_nm: torques(&[0.5, -1.25, 0.0]),
         limiting: limiting(&[&[], &[Limit::Torque, Limit::UpperStop], &[]]),
+        ..Record::BLANK
     }
 }
 
@@ -231,7 +231,6 @@ fn grasping(k: u32, decimation: u16, step: i32) -> AnyRecord {
         law_signals: PerSignal::all(0.0),
         work_j: 0.002 + 0.003 * share,
         damped_j: 0.0005 * share,
-        excess_j: -0.001 * share,
         cycles: 11_603 + k,
         late_ticks: 0,
         dropped: 0,
@@ -239,6 +238,7 @@ fn grasping(k: u32, decimation: u16, step: i32) -> AnyRecord {
         counts: counts(&(0..JOINTS as i32).map(count).collect::<Vec<_>>()),
         torques_nm: torques(&(0..JOINTS).map(|j| 0.3 * share - 0.01 * j as f32).collect::<Vec<_>>()),
         limiting: limiting(&[NOTHING; JOINTS]),
+        ..Record::BLANK
     }
 }
 

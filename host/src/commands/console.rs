@@ -6,7 +6,7 @@ use blindgrasp::device::recorder::{ENDED_ANOTHER, Recorder, Recording};
 use blindgrasp::device::talk::{self, Event, SELDOM, Talk, TalkError, telemetry};
 use blindgrasp::device::transport::{Transport, TransportError};
 use blindgrasp::scene::HandModel;
-use blindgrasp::wire::{Answer, Firmware, Record, Request};
+use blindgrasp::wire::{Answer, Firmware, Record, Request, label, potentials, scalars};
 use blindgrasp_shared::command::{self, Command, Grasp, Refusal};
 use blindgrasp_shared::control::{GAIN_COUNT, GAINS};
 use blindgrasp_shared::parameters::{Bound, Each, Parameter, Setting};
@@ -543,13 +543,10 @@ impl Console {
         let gains = GAINS.iter().zip(record.gains.iter());
         let gains = gains.map(|(gain, value)| format!("{value} {}", gain.unit)).collect::<Vec<_>>();
         row("grasp", gains.join(", "));
-        row(
-            "energy",
-            format!(
-                "work {:.6} J, damped {:.6} J, excess {:.6} J",
-                record.work_j, record.damped_j, record.excess_j
-            ),
-        );
+        let energies =
+            scalars(record).into_iter().skip(potentials().end).filter(|(signal, _)| signal.unit == "J");
+        let energies = energies.map(|(signal, value)| format!("{} {value:.6} J", label(&signal)));
+        row("energy", energies.collect::<Vec<_>>().join(", "));
         row("cycles", record.cycles.to_string());
         row("lost", format!("{} records and answers", record.dropped));
         row("link", self.talk.traffic().to_string());

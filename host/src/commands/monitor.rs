@@ -352,7 +352,7 @@ impl Monitor {
         self.input.turn(now);
         let screen = Screen {
             source,
-            plot: Plot::ALL[self.plot],
+            plot: Plot::all()[self.plot],
             window_s: WINDOWS_S[self.window],
             joint: self.joint,
             help: self.help,
@@ -397,7 +397,7 @@ impl Monitor {
         let step =
             |at: usize, by: isize, count: usize| (at as isize + by).rem_euclid(count as isize) as usize;
         match intent {
-            Intent::Plot(by) => self.plot = step(self.plot, by, Plot::ALL.len()),
+            Intent::Plot(by) => self.plot = step(self.plot, by, Plot::all().len()),
             Intent::Window => self.window = step(self.window, 1, WINDOWS_S.len()),
             Intent::Joint(by) => {
                 // The first place is that of all joints.

@@ -7,14 +7,16 @@ use super::history::{History, Range};
 use super::rate::Rate;
 use crate::scene::HandModel;
 use crate::wire::Record;
+use crate::wire::{label, potentials, scalars};
 use blindgrasp_shared::command::{Command, Refusal};
-use blindgrasp_shared::control::{GAIN_COUNT, GAINS, Gain};
+use blindgrasp_shared::control::Signal;
 use blindgrasp_shared::event;
 use blindgrasp_shared::limit::Limiting;
 use blindgrasp_shared::link::rate::FIRST_BAUD;
 use blindgrasp_shared::parameters::Parameter;
 use blindgrasp_shared::supervisor::{self, Mode, Outcome};
 use std::collections::VecDeque;
+use std::sync::LazyLock;
 use std::time::Duration;
 
 /// Bits on the wire a byte: with start and stop bit.
@@ -146,35 +148,23 @@ pub enum Plot {
     Angles,
     /// Speeds of the joints.
     Speeds,
-    /// A gain, by its number in the table of gains.
-    Gain(usize),
     /// Potentials of the laws.
     Potentials,
-    /// Work of the motors and of the damping.
-    Work,
-    /// Work beyond the law's.
-    Excess,
-    /// Time of a tick.
-    Cycles,
+    /// Another signal of the hand, by its number among the [scalars].
+    Scalar(usize),
 }
 
 impl Plot {
     /// Every plot.
-    pub const ALL: [Self; 7 + GAIN_COUNT] = {
-        let mut all = [Self::Torques; 7 + GAIN_COUNT];
-        all[1] = Self::Angles;
-        all[2] = Self::Speeds;
-        let mut k = 0;
-        while k < GAIN_COUNT {
-            all[3 + k] = Self::Gain(k);
-            k += 1;
-        }
-        all[3 + k] = Self::Potentials;
-        all[4 + k] = Self::Work;
-        all[5 + k] = Self::Excess;
-        all[6 + k] = Self::Cycles;
-        all
-    };
+    pub fn all() -> &'static [Self] {
+        static ALL: LazyLock<Vec<Plot>> = LazyLock::new(|| {
+            let potentials = potentials();
+            let others = (0..scalars(&Record::BLANK).len()).filter(|k| !potentials.contains(k));
+            let of_joints = [Plot::Torques, Plot::Angles, Plot::Speeds];
+            of_joints.into_iter().chain(others.map(Plot::Scalar)).chain([Plot::Potentials]).collect()
+        });
+        &ALL
+    }
 
     /// What it is, with the unit.
     pub fn words(self) -> String {
@@ -182,22 +172,19 @@ impl Plot {
             Self::Torques => "torques, N m".into(),
             Self::Angles => "angles, rad".into(),
             Self::Speeds => "speeds, rad/s".into(),
-            Self::Gain(k) => {
-                let Gain { words, unit, .. } = GAINS[k];
+            Self::Potentials => "potentials of the laws, J".into(),
+            Self::Scalar(k) => {
+                let Signal { unit, words, .. } = scalars(&Record::BLANK)[k].0;
                 format!("{}, {unit}", words.split(';').next().unwrap_or(words))
             }
-            Self::Potentials => "potentials of the laws, J".into(),
-            Self::Work => "work since the grasp began, J".into(),
-            Self::Excess => "work of the last second beyond the potentials, J".into(),
-            Self::Cycles => "cycles of a tick".into(),
         }
     }
 
     /// Names of the signals that are drawn together, where they are not joints'.
-    pub fn signals(self) -> Vec<&'static str> {
+    pub fn signals(self) -> Vec<String> {
+        let named = scalars(&Record::BLANK);
         match self {
-            Self::Potentials => GAINS.iter().map(|gain| gain.potential.key).collect(),
-            Self::Work => vec!["motors", "damping"],
+            Self::Potentials => potentials().map(|k| label(&named[k].0)).collect(),
             _ => Vec::new(),
         }
     }
@@ -207,13 +194,6 @@ impl Plot {
         matches!(self, Self::Torques | Self::Angles | Self::Speeds)
     }
 }
-
-// Signals of the history that are not of joints, in their order: gains, potentials, and these; those of the joints follow,
-// plot by plot.
-const WORK: [usize; 2] = [2 * GAIN_COUNT, 2 * GAIN_COUNT + 1];
-const EXCESS: usize = 2 * GAIN_COUNT + 2;
-const CYCLES: usize = 2 * GAIN_COUNT + 3;
-const SCALARS: usize = 2 * GAIN_COUNT + 4;
 
 /// What is known of a hand.
 #[derive(Clone, Debug)]
@@ -367,8 +347,7 @@ impl Model {
     /// Adds what is known now to the history.
     fn remember(&mut self, at: Duration) {
         let Some((_, record)) = &self.record else { return };
-        let others = [record.work_j, record.damped_j, record.excess_j, record.cycles as f32];
-        let scalars = record.gains.iter().chain(record.potentials_j.iter()).copied().chain(others);
+        let scalars = scalars(record).into_iter().map(|(_, value)| value);
         let joints: Vec<Joint<'_>> = self.joints().collect();
         let unknown = |value: Option<f32>| value.unwrap_or(f32::NAN);
         let torques = joints.iter().map(|joint| unknown(joint.torque_nm));
@@ -538,7 +517,7 @@ impl Model {
         columns: usize,
     ) -> Vec<Vec<Option<Range>>> {
         let of_joints = |place: usize| {
-            let first = SCALARS + place * self.joint_count();
+            let first = scalars(&Record::BLANK).len() + place * self.joint_count();
             match joint {
                 Some(joint) => vec![first + joint],
                 None => (first..first + self.joint_count()).collect(),
@@ -548,11 +527,8 @@ impl Model {
             Plot::Torques => of_joints(0),
             Plot::Angles => of_joints(1),
             Plot::Speeds => of_joints(2),
-            Plot::Gain(k) => vec![k],
-            Plot::Potentials => (GAIN_COUNT..2 * GAIN_COUNT).collect(),
-            Plot::Work => WORK.to_vec(),
-            Plot::Excess => vec![EXCESS],
-            Plot::Cycles => vec![CYCLES],
+            Plot::Potentials => potentials().collect(),
+            Plot::Scalar(k) => vec![k],
         };
         signals.iter().map(|&signal| self.history.columns(signal, until, window, columns)).collect()
     }
@@ -719,7 +695,7 @@ pub(super) mod tests {
         let at = |tick: f32| 10.0 * tick * std::f32::consts::TAU / 21_600.0;
         let [first, Some(second)] = angle[0][..] else { panic!("{angle:?}") };
         assert!(first.is_some() && (second.most - at(999.0)).abs() < 1e-4, "{second:?}");
-        for plot in Plot::ALL {
+        for &plot in Plot::all() {
             let count = model.plotted(plot, Some(0), ms(1000), ms(1000), 3).len();
             assert_eq!(count, plot.signals().len().max(1), "{plot:?}");
         }

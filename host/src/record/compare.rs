@@ -230,7 +230,7 @@ mod tests {
                 t.record.answer =
                     Some(blindgrasp_shared::command::Answer { command: Command::Arm, refused: None });
             }),
-            ("reading_failed", |t| t.record.reading_failed = Some(Raised::at(1, Fault::SampleMissing))),
+            ("reading_failed", |t| t.record.reading_failed = Some(Raised::of_hand(Fault::SampleMissing))),
             ("tick", |t| t.record.tick += 1),
             ("decimation", |t| t.record.decimation = 2),
             ("sequence", |t| t.record.sequence += 1),

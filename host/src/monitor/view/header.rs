@@ -2,7 +2,7 @@
 
 use super::super::model::{Level, Link, Model};
 use super::{Screen, Source, fit, fixed};
-use blindgrasp_shared::control::GAINS;
+use crate::wire::{label, potentials, scalars};
 use blindgrasp_shared::event::Event;
 use blindgrasp_shared::supervisor::Mode;
 use ratatui::style::{Modifier, Style};
@@ -65,13 +65,14 @@ fn state<'a>(model: &'a Model, screen: &Screen<'a>, now: Duration, width: usize)
     if record.events.contains(Event::FallbackClock) {
         parts.push(Span::styled("fall-back clock", palette.warning()));
     }
-    for (gain, value) in GAINS.iter().zip(record.gains.iter()) {
-        if *value > 0.0 {
-            parts.push(Span::raw(format!("{} {}", gain.key, fixed(*value, 4))));
+    for (k, (signal, value)) in scalars(record).into_iter().enumerate() {
+        // What does not act says nothing, and potentials have a plot.
+        let is_shown = signal.unit != "cycles" && !potentials().contains(&k) && value != 0.0;
+        if is_shown {
+            let digits = if value.abs() < 1.0 { 4 } else { 2 };
+            parts.push(Span::raw(format!("{} {} {}", label(&signal), fixed(value, digits), signal.unit)));
         }
     }
-    parts.push(Span::raw(format!("work {} J", fixed(record.work_j, 3))));
-    parts.push(Span::raw(format!("excess {} J", fixed(record.excess_j, 3))));
     if let Some(time_s) = model.device_time_s() {
         parts.push(Span::styled(format!("device {time_s:.1} s"), palette.faint()));
     }

@@ -29,13 +29,13 @@ macro_rules! control {
                 let mut gains = PerGain::all(None);
                 let mut laws = None;
                 $(let mut $field = None;)*
-                while let Some(key) = map.next_key::<String>()? {
+                while let Some(Key(key)) = map.next_key()? {
                     let known = GAINS.iter().zip(gains.iter_mut()).find(|(gain, _)| gain.key == key);
                     match (known, key.as_str()) {
                         (Some((_, place)), _) => *place = Some(map.next_value()?),
                         (None, "laws") => laws = Some(chosen(map.next_value()?)?),
                         $((None, stringify!($field)) => $field = Some(map.next_value()?),)*
-                        (None, _) => return Err(A::Error::unknown_field(&key, &ALL_KEYS)),
+                        (None, _) => return Err(A::Error::unknown_field(&key, ALL_KEYS.as_slice())),
                     }
                 }
                 for (gain, value) in GAINS.iter().zip(gains.grasp) {
@@ -86,6 +86,20 @@ control! {
 /// Every key, for suggestions.
 static ALL_KEYS: LazyLock<Vec<&'static str>> =
     LazyLock::new(|| GAINS.iter().map(|gain| gain.key).chain(Control::KEYS.iter().copied()).collect());
+
+/// A key that there is. What is refused while it is read is told with its place.
+struct Key(String);
+
+impl<'de> Deserialize<'de> for Key {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let key = String::deserialize(deserializer)?;
+        if ALL_KEYS.contains(&key.as_str()) {
+            Ok(Self(key))
+        } else {
+            Err(D::Error::unknown_field(&key, ALL_KEYS.as_slice()))
+        }
+    }
+}
 
 /// The laws of these names.
 fn chosen<E: de::Error>(names: Vec<String>) -> Result<Chosen, E> {
