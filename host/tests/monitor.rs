@@ -2,6 +2,8 @@
 
 #![cfg(unix)]
 
+mod patient;
+
 use nix::sys::signal::{Signal, kill};
 use nix::sys::termios::{LocalFlags, tcgetattr};
 use nix::unistd::Pid;
@@ -20,8 +22,6 @@ use tempfile::TempDir;
 const BLINDGRASP: &str = env!("CARGO_BIN_EXE_blindgrasp");
 /// How long anything may take: machines that do a lot else are slow.
 const PATIENCE: Duration = Duration::from_secs(30);
-/// The file of a hand that is served, beside its port.
-const PATIENT: &str = "patient.toml";
 const ROWS: u16 = 30;
 const COLUMNS: u16 = 100;
 
@@ -41,7 +41,7 @@ impl Hand {
         let port = folder.path().join("hand");
         let _ = std::fs::remove_file(&port);
         let is_patient = std::env::var_os("BLINDGRASP_BLESS").is_none();
-        let scene = if is_patient { Self::patient(folder) } else { "cube".into() };
+        let scene = if is_patient { patient::scene(folder, 1000) } else { "cube".into() };
         let mut child = Command::new(BLINDGRASP)
             .arg("serve")
             .arg(scene)
@@ -59,22 +59,9 @@ impl Hand {
         Self { child, port }
     }
 
-    /// A scene whose hand lets the heartbeat fail for a second, as it may on a machine that does a lot else.
-    fn patient(folder: &TempDir) -> PathBuf {
-        let models = Path::new(env!("CARGO_MANIFEST_DIR")).join("../models");
-        let read = |file: &str| std::fs::read_to_string(models.join(file)).expect("a model");
-        let hand = read("hands/three-finger.toml") + "\n[safety]\nheartbeat_ms = 1000\n";
-        std::fs::write(folder.path().join(PATIENT), hand).expect("a file");
-        let scene =
-            read("scenes/cube.toml").replacen("hand = \"three-finger\"", &format!("hand = \"{PATIENT}\""), 1);
-        let path = folder.path().join("scene.toml");
-        std::fs::write(&path, scene).expect("a file");
-        path
-    }
-
     /// The arguments that tell a monitor of such a hand, at a port in the same folder.
     fn known(port: &str) -> Vec<String> {
-        let hand = Path::new(port).with_file_name(PATIENT);
+        let hand = Path::new(port).with_file_name(patient::HAND);
         if hand.exists() { vec!["--hand".into(), text(&hand).into()] } else { Vec::new() }
     }
 }

@@ -1,9 +1,12 @@
 //! `examples/python/blindgrasp_client.py` against a simulated hand in real time: the processes that a user would start.
 #![cfg(unix)]
 
+mod patient;
+
 use std::io::{BufRead, BufReader};
 use std::path::Path;
 use std::process::{Child, Command, Stdio};
+use tempfile::TempDir;
 
 /// `blindgrasp serve`, and its port.
 struct Served {
@@ -12,9 +15,11 @@ struct Served {
 }
 
 impl Served {
-    fn start(scene: &str) -> Self {
+    fn start(scene: &Path) -> Self {
         let mut child = Command::new(env!("CARGO_BIN_EXE_blindgrasp"))
-            .args(["serve", scene, "--baud", "3000000"])
+            .arg("serve")
+            .arg(scene)
+            .args(["--baud", "3000000"])
             .stdout(Stdio::piped())
             .stderr(Stdio::null())
             .spawn()
@@ -51,9 +56,10 @@ impl Drop for Served {
 
 #[test]
 fn the_python_client_grasps_with_a_simulated_hand() {
-    let served = Served::start("cube");
     // Tests run beside this one: the client is not to be blamed for a machine without time.
-    let (key, value) = ("faults.heartbeat_ms", "5000");
+    let folder = TempDir::new().expect("a folder");
+    let served = Served::start(&patient::scene(&folder, 5000));
+    let (key, value) = ("faults.heartbeat_ms", "4000");
     let (code, _, err) = served.client(&["set", key, value]);
     assert_eq!(code, Some(0), "{err}");
     let (code, out, err) = served.client(&["get", key]);
