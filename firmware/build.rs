@@ -1,11 +1,10 @@
-//! Turns a hand's file into constants of the firmware.
+//! Turns a hand's file into what the firmware is built with.
 //!
 //! `HAND` names the file: a path from the root of the repository, or the name of a built-in hand. It is read and
-//! checked as `blindgrasp sim` would, and becomes `hand.rs` in `OUT_DIR`:
+//! checked as `blindgrasp sim` would, and becomes `hand.bin` in `OUT_DIR`, kinematics and configuration as the simulation
+//! would use them, to the bit (`blindgrasp_shared::model`), and the constants in `hand.rs`:
 //!
 //! - `JOINTS`, `FINGERS`: its exact sizes;
-//! - `HAND`, `CONFIG`: kinematics and configuration, which the simulation would use too, to the bit;
-//! - `TORQUES_PER_VOLT_NM_V`: scales and signs of the outputs;
 //! - `IMAGE_HAND`, `IMAGE_PIL`: what the two images say of themselves (`blindgrasp_shared::identity::Image`), so that
 //!   a host knows before it flashes, and on a running hand, for which hand and from which sources an image was built.
 //!
@@ -57,26 +56,30 @@ fn build() -> Result<()> {
     println!("cargo::rustc-link-search={}", out.display());
 
     let hand = load_hand(&root)?;
-    let constants = hand.source();
+    let model = hand.bytes();
+    let (joint_count, fingertip_count) = (hand.hand.joint_count(), hand.hand.fingertip_count());
     let mut image = Image {
         interface_version: INTERFACE_VERSION,
         kind: "hand",
         hand: &hand.name,
-        hand_hash: CRC.checksum(constants.as_bytes()),
+        hand_hash: blindgrasp_shared::model::hash(&model),
         firmware_version: env!("CARGO_PKG_VERSION"),
         build_hash: build_hash()?,
-        joint_count: hand.hand.joint_count().try_into()?,
-        fingertip_count: hand.hand.fingertip_count().try_into()?,
+        joint_count: joint_count.try_into()?,
+        fingertip_count: fingertip_count.try_into()?,
         period_us: hand.config.period_us,
     };
     let image_hand = constant("IMAGE_HAND", &image)?;
     image.kind = "pil";
     let image_pil = constant("IMAGE_PIL", &image)?;
-    let images = format!(
-        "/// What the image for real joints is.\n{image_hand}\
+    let constants = format!(
+        "/// Joints of the hand.\npub const JOINTS: usize = {joint_count};\n\
+         /// Fingertips of the hand.\npub const FINGERS: usize = {fingertip_count};\n\
+         /// What the image for real joints is.\n{image_hand}\
          /// What the image with joints over the link is.\n{image_pil}"
     );
-    fs::write(out.join("hand.rs"), constants + &images)?;
+    fs::write(out.join("hand.rs"), constants)?;
+    fs::write(out.join("hand.bin"), model)?;
     Ok(())
 }
 

@@ -1,11 +1,13 @@
-//! The constants that this firmware was built with, against the hand's file (`HAND`, as for the build).
+//! What this firmware was built with, against the hand's file (`HAND`, as for the build).
 
-use blindgrasp::scene::{HandModel, config_source};
-use blindgrasp_firmware::model::{CONFIG, FINGERS, HAND, IMAGE_HAND, IMAGE_PIL, JOINTS};
+use blindgrasp::scene::HandModel;
+use blindgrasp_firmware::model::{
+    FINGERS, IMAGE_HAND, IMAGE_PIL, JOINTS, MODEL, params, torques_per_volt_nm_v,
+};
 use blindgrasp_shared::hand::Hand;
 use blindgrasp_shared::identity::Image;
+use blindgrasp_shared::model::encode;
 use blindgrasp_shared::telemetry::INTERFACE_VERSION;
-use blindgrasp_shared::tick::Params;
 
 fn hand_model() -> HandModel {
     std::env::set_current_dir(concat!(env!("CARGO_MANIFEST_DIR"), "/.."))
@@ -15,14 +17,16 @@ fn hand_model() -> HandModel {
     HandModel::load(name).expect("the build has read it")
 }
 
-/// What the compiler made of the digits is what the simulation computes with. The texts tell minus zero from zero.
+/// What the firmware decodes is what the simulation computes with, in whatever capacity. The bytes tell minus zero from zero.
 #[test]
-fn the_constants_are_the_hand_to_the_bit() {
+fn the_model_is_the_hand_to_the_bit() {
     let model = hand_model();
+    assert_eq!(MODEL, model.bytes());
+    let params = params();
     let hand: Hand<f32, JOINTS, FINGERS> = model.hand.fit().expect("it has this size").cast();
-    assert_eq!(format!("{HAND:?}"), format!("{hand:?}"));
-    assert_eq!(config_source(&CONFIG, JOINTS), config_source(&model.config, JOINTS));
-    Params::new(HAND.clone(), &CONFIG).expect("the build has checked it");
+    assert_eq!(*params.hand(), hand);
+    let mut buffer = [0; 8192];
+    assert_eq!(encode(params.hand(), params.config(), &torques_per_volt_nm_v(), &mut buffer), Ok(MODEL));
 }
 
 #[test]
@@ -33,7 +37,7 @@ fn the_images_say_what_they_are() {
         assert_eq!((image.kind, image.hand), (kind, model.name.as_str()));
         assert_eq!((usize::from(image.joint_count), usize::from(image.fingertip_count)), (JOINTS, FINGERS));
         assert_eq!(image.interface_version, INTERFACE_VERSION);
-        assert_eq!(image.period_us, CONFIG.period_us);
+        assert_eq!((image.period_us, image.hand_hash), (model.config.period_us, model.hash()));
         assert_eq!(image.firmware_version, env!("CARGO_PKG_VERSION"));
     }
 }

@@ -41,13 +41,15 @@
 //! Counts are subtracted as integers, with wrap-around, before anything becomes a float: what the filter keeps are
 //! small numbers, however far the counters have run.
 
+use crate::array::Item;
 use crate::bytes::{BufferTooSmall, Loader, Saver, SnapshotError};
 use crate::math::Real;
 use crate::parameter::ParameterError;
 use crate::period::Period;
+use serde::{Deserialize, Serialize};
 
 /// How the counts of one joint are read.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Encoder {
     /// The count at joint angle zero.
     pub zero_count: i32,
@@ -64,6 +66,17 @@ pub struct EstimatorConfig<const J: usize> {
     pub bandwidth_hz: f32,
     /// One a joint.
     pub encoders: [Encoder; J],
+}
+
+impl Item for Encoder {
+    fn filler() -> Self {
+        Self { zero_count: 0, rad_per_count: 0.0, reversed: false }
+    }
+
+    // The scale of one that is there is positive.
+    fn is_filler(&self) -> bool {
+        self.rad_per_count == 0.0
+    }
 }
 
 impl<const J: usize> EstimatorConfig<J> {

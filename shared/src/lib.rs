@@ -12,6 +12,7 @@
 #[cfg(test)]
 extern crate std;
 
+mod array;
 pub mod bytes;
 pub mod command;
 pub mod control;
@@ -26,10 +27,10 @@ pub mod limit;
 pub mod link;
 pub mod list;
 pub mod math;
+pub mod model;
 pub mod parameter;
 pub mod parameters;
 pub mod period;
-
 pub mod signals;
 pub mod supervisor;
 pub mod telemetry;

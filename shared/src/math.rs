@@ -9,6 +9,8 @@
 use core::ops::Neg;
 use nalgebra::{ClosedAddAssign, ClosedDivAssign, ClosedMulAssign, ClosedSubAssign, Scalar, Vector3};
 use num_traits::{One, Zero};
+use serde::Serialize;
+use serde::de::DeserializeOwned;
 
 /// The reals of this crate: `f32` in the controller, `f64` in the plant and the tests.
 ///
@@ -24,6 +26,8 @@ pub trait Real:
     + ClosedSubAssign
     + ClosedMulAssign
     + ClosedDivAssign
+    + Serialize
+    + DeserializeOwned
 {
     /// Sine and cosine of an angle in radians.
     ///

@@ -9,11 +9,14 @@ use super::{
     file::{Actuators, HandFile, JointFile, PlantSettings, Sensors},
     hand::{hand, kinematics},
     library::{Document, Kind, is_path},
-    source::{IMPORTS, Source, config_source},
 };
 use crate::{Hand, MAX_JOINTS};
+use blindgrasp_shared::model;
 use blindgrasp_shared::tick::{Config, Params};
 use std::path::{Path, PathBuf};
+
+/// Bytes that the largest hand and its configuration take: 250 a joint are more than enough.
+const MODEL_BYTES: usize = 1000 + 250 * MAX_JOINTS;
 
 /// A hand, checked, with the configuration that its file asks for: the gains of `[control]`, the numbers of `[safety]`, and all
 /// limits and faults that a real hand has. Gravity is along `-z` of the base: the palm looks up.
@@ -90,7 +93,18 @@ impl HandModel {
 
     /// CRC-32 of all that a firmware takes from the hand: equal hands have equal firmware.
     pub fn hash(&self) -> u32 {
-        crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC).checksum(self.source().as_bytes())
+        model::hash(&self.bytes())
+    }
+
+    /// What a firmware is built with: the hand, its configuration and the scales of its outputs, as [`model`] writes them. The same hand gives the same
+    /// bytes, wherever its file lies.
+    ///
+    /// # Panics
+    /// Never: the largest hand fits.
+    pub fn bytes(&self) -> Vec<u8> {
+        let mut buffer = [0; MODEL_BYTES];
+        let (hand, outputs) = (self.hand.cast(), &self.torques_per_volt_nm_v);
+        model::encode(&hand, &self.config, outputs, &mut buffer).expect("the largest hand fits").to_vec()
     }
 
     pub(crate) fn build(file: &HandFile) -> Result<Self> {
@@ -125,41 +139,6 @@ impl HandModel {
         };
         let torques_per_volt_nm_v = file.joints.iter().map(per_volt).collect();
         Ok(Self { name: file.name.clone(), hand, joint_names, config, torques_per_volt_nm_v, warnings })
-    }
-
-    /// What the firmware is built with, as Rust source: the constants `JOINTS`, `FINGERS`, `HAND`, `CONFIG`
-    /// and `TORQUES_PER_VOLT_NM_V`. The same hand
-    /// gives the same text, wherever its file lies.
-    pub fn source(&self) -> String {
-        let hand = self.hand.cast::<f32>();
-        let (joints, fingertips) = (hand.prepared_joints(), hand.prepared_fingertips());
-        let count = joints.len();
-        format!(
-            "{IMPORTS}
-/// Joints of the hand.
-pub const JOINTS: usize = {count};
-/// Fingertips of the hand.
-pub const FINGERS: usize = {};
-/// The hand `{}`, prepared.
-#[allow(clippy::approx_constant, clippy::excessive_precision)]
-pub static HAND: Hand<f32, JOINTS, FINGERS> = match Hand::from_prepared({}, {}) {{
-    Ok(hand) => hand,
-    Err(_) => panic!(\"the joints are no tree\"),
-}};
-/// Its gains, limits and times.
-#[allow(clippy::approx_constant, clippy::excessive_precision)]
-pub static CONFIG: Config<JOINTS> = {};
-/// Torque at each joint for each volt at its amplifier, N m/V; negative where the motor is reversed.
-#[allow(clippy::approx_constant, clippy::excessive_precision)]
-pub static TORQUES_PER_VOLT_NM_V: [f32; JOINTS] = {};
-",
-            fingertips.len(),
-            self.name,
-            joints.source(count),
-            fingertips.source(count),
-            config_source(&self.config, count),
-            self.torques_per_volt_nm_v.source(count),
-        )
     }
 }
 

@@ -22,7 +22,6 @@ mod library;
 pub mod mesh;
 mod object;
 mod read;
-mod source;
 mod start;
 #[cfg(test)]
 mod tests;
@@ -54,7 +53,6 @@ pub use hand_model::HandModel;
 pub use library::is_of_files;
 pub use object::ObjectBody;
 pub(crate) use object::breaks_triangle;
-pub use source::config_source;
 pub use tree::Setting;
 pub use urdf::{FingertipRequest, Starter, StarterRequest};
 

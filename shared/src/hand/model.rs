@@ -1,12 +1,15 @@
 //! What a hand is: joints, links and fingertips, checked and prepared once.
 
 use super::check::{check_counts, check_fingertip, check_joint};
+use crate::array::{self, Item};
 use crate::math::{Real, norm};
 use core::fmt;
 use nalgebra::{Matrix3, Vector3};
+use serde::{Deserialize, Serialize};
 
 /// A rigid link, in its own frame.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(bound = "T: Real")]
 pub struct Link<T> {
     /// Mass, kg; zero for a link whose mass is counted in another.
     pub mass_kg: T,
@@ -36,7 +39,8 @@ pub struct Joint<T> {
 }
 
 /// A hemispherical fingertip.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(bound = "T: Real")]
 pub struct Fingertip<T> {
     /// Index of the link that it is part of.
     pub link: usize,
@@ -131,7 +135,8 @@ impl core::error::Error for HandError {}
 
 /// How the axes of a planar chain lie against those of the link that it starts from, by the angles of Denavit and
 /// Hartenberg: turned about z until x is the common normal of both joint axes, then twisted about x.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(bound = "T: Real")]
 pub struct Bend<T> {
     /// Sine of the turn.
     pub turn_sine: T,
@@ -147,7 +152,8 @@ pub struct Bend<T> {
 ///
 /// A joint that follows its parent in the list and has a parallel axis continues the parent's **planar chain**: its frame
 /// at zero angle is the parent's. All other joints start a chain.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(bound = "T: Real")]
 pub struct PreparedJoint<T> {
     /// Index of the parent link's joint, smaller than this joint's own; `None` for the base.
     pub parent: Option<usize>,
@@ -169,12 +175,59 @@ pub struct PreparedJoint<T> {
 }
 
 /// A hand, checked and prepared: at most `J` joints and `F` fingertips.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(bound = "T: Real", try_from = "Parts<T, J, F>")]
 pub struct Hand<T, const J: usize, const F: usize> {
+    #[serde(skip)]
     pub(super) joint_count: usize,
+    #[serde(skip)]
     pub(super) fingertip_count: usize,
+    #[serde(with = "crate::array")]
     pub(super) joints: [PreparedJoint<T>; J],
+    #[serde(with = "crate::array")]
     pub(super) fingertips: [Fingertip<T>; F],
+}
+
+/// What is written of a hand. What was computed is believed when it is read, the tree is checked.
+#[derive(Deserialize)]
+#[serde(bound = "T: Real")]
+struct Parts<T, const J: usize, const F: usize> {
+    #[serde(with = "crate::array")]
+    joints: [PreparedJoint<T>; J],
+    #[serde(with = "crate::array")]
+    fingertips: [Fingertip<T>; F],
+}
+
+#[inline(never)]
+fn check_tree<T: Real>(joints: &[PreparedJoint<T>], fingertips: &[Fingertip<T>]) -> Result<(), HandError> {
+    for (k, joint) in joints.iter().enumerate() {
+        if joint.parent.is_some_and(|parent| parent >= k) {
+            return Err(HandError::ParentNotBefore { joint: k });
+        }
+        if joint.bend.is_none() && joint.parent.is_none_or(|parent| parent + 1 != k) {
+            let reason = "has to be given where the joint before is not the parent";
+            return Err(HandError::Joint { joint: k, parameter: "bend", reason });
+        }
+    }
+    match fingertips.iter().position(|fingertip| fingertip.link >= joints.len()) {
+        Some(fingertip) => {
+            let reason = "has to be the index of a joint";
+            Err(HandError::Fingertip { fingertip, parameter: "link", reason })
+        }
+        None => Ok(()),
+    }
+}
+
+impl<T: Real, const J: usize, const F: usize> TryFrom<Parts<T, J, F>> for Hand<T, J, F> {
+    type Error = HandError;
+
+    fn try_from(parts: Parts<T, J, F>) -> Result<Self, HandError> {
+        let Parts { joints, fingertips } = parts;
+        let (joint_count, fingertip_count) = (array::count(&joints), array::count(&fingertips));
+        check_counts::<J, F>(joint_count, fingertip_count)?;
+        check_tree(&joints[..joint_count], &fingertips[..fingertip_count])?;
+        Ok(Self { joint_count, fingertip_count, joints, fingertips })
+    }
 }
 
 impl<T: Real, const J: usize, const F: usize> Hand<T, J, F> {
@@ -220,50 +273,6 @@ impl<T: Real, const J: usize, const F: usize> Hand<T, J, F> {
             Some(joint) => Err(HandError::MovesNoFingertip { joint }),
             None => Ok(hand),
         }
-    }
-
-    /// A hand of exact size from what [`Self::prepared_joints`] and [`Self::prepared_fingertips`] gave, as a constant: the
-    /// host prepares a hand, the firmware is built with the result. What was computed is believed, the tree is checked.
-    ///
-    /// # Errors
-    /// No joint, fewer than two fingertips, a parent that does not come before its joint, a chain that continues nothing,
-    /// or a fingertip on no link.
-    pub const fn from_prepared(
-        joints: [PreparedJoint<T>; J],
-        fingertips: [Fingertip<T>; F],
-    ) -> Result<Self, HandError> {
-        if J == 0 {
-            return Err(HandError::NoJoints);
-        }
-        if F < 2 {
-            return Err(HandError::TooFewFingertips { count: F });
-        }
-        let mut joint = 0;
-        while joint < J {
-            if let Some(parent) = joints[joint].parent
-                && parent >= joint
-            {
-                return Err(HandError::ParentNotBefore { joint });
-            }
-            let continues = match joints[joint].parent {
-                Some(parent) => parent + 1 == joint,
-                None => false,
-            };
-            if joints[joint].bend.is_none() && !continues {
-                let reason = "has to be given where the joint before is not the parent";
-                return Err(HandError::Joint { joint, parameter: "bend", reason });
-            }
-            joint += 1;
-        }
-        let mut fingertip = 0;
-        while fingertip < F {
-            if fingertips[fingertip].link >= J {
-                let reason = "has to be the index of a joint";
-                return Err(HandError::Fingertip { fingertip, parameter: "link", reason });
-            }
-            fingertip += 1;
-        }
-        Ok(Self { joint_count: J, fingertip_count: F, joints, fingertips })
     }
 
     /// The joints as they were prepared.
@@ -357,6 +366,28 @@ impl<T: Real, const J: usize, const F: usize> Hand<T, J, F> {
     pub fn joints_to(&self, fingertip: usize) -> impl Iterator<Item = usize> + '_ {
         let first = self.fingertips[..self.fingertip_count.min(F)].get(fingertip).map(|tip| tip.link);
         core::iter::successors(first, |&joint| self.parent(joint))
+    }
+}
+
+impl<T: Real> Item for PreparedJoint<T> {
+    fn filler() -> Self {
+        Self::still()
+    }
+
+    // A joint that is there has a bend or a parent.
+    fn is_filler(&self) -> bool {
+        self.bend.is_none() && self.parent.is_none()
+    }
+}
+
+impl<T: Real> Item for Fingertip<T> {
+    fn filler() -> Self {
+        no_fingertip()
+    }
+
+    // The radius of one that is there is positive.
+    fn is_filler(&self) -> bool {
+        self.radius_m == T::zero()
     }
 }
 
@@ -485,30 +516,31 @@ mod tests {
     #[test]
     fn a_prepared_hand_is_the_hand_that_was_prepared() {
         let (joints, fingertips) = pair();
-        let hand = Hand::from_prepared(joints, fingertips).unwrap();
+        let hand = Hand::try_from(Parts { joints, fingertips }).unwrap();
         assert_eq!((hand.joint_count(), hand.fingertip_count()), (3, 2));
         assert_eq!((hand.prepared_joints(), hand.prepared_fingertips()), (&joints[..], &fingertips[..]));
         let larger: Hand<f32, 7, 4> = hand.fit().unwrap();
-        assert_eq!((larger.prepared_joints(), larger.prepared_fingertips()), (&joints[..], &fingertips[..]));
+        let Hand { joints, fingertips, .. } = larger.clone();
+        assert_eq!(Hand::try_from(Parts { joints, fingertips }), Ok(larger), "with room to spare");
     }
 
     #[test]
     fn what_is_no_tree_is_refused() {
-        let (mut joints, fingertips) = pair();
-        joints[1].parent = Some(1);
-        let error = Hand::from_prepared(joints, fingertips).unwrap_err();
+        let refused = |change: fn(&mut Pair)| {
+            let mut pair = pair();
+            change(&mut pair);
+            let (joints, fingertips) = pair;
+            Hand::try_from(Parts { joints, fingertips }).unwrap_err()
+        };
+        let error = refused(|(joints, _)| joints[1].parent = Some(1));
         assert_eq!(error, HandError::ParentNotBefore { joint: 1 });
-        let (mut joints, fingertips) = pair();
-        joints[2].bend = None;
-        let error = Hand::from_prepared(joints, fingertips).unwrap_err();
+        let error = refused(|(joints, _)| (joints[2].parent, joints[2].bend) = (Some(0), None));
         assert!(matches!(error, HandError::Joint { joint: 2, parameter: "bend", .. }));
-        let (joints, mut fingertips) = pair();
-        fingertips[1].link = 3;
-        let error = Hand::from_prepared(joints, fingertips).unwrap_err();
+        let error = refused(|(_, fingertips)| fingertips[1].link = 3);
         assert!(matches!(error, HandError::Fingertip { fingertip: 1, parameter: "link", .. }));
-        let error = Hand::<f32, 3, 1>::from_prepared(joints, [fingertips[0]]).unwrap_err();
+        let error = refused(|(_, fingertips)| fingertips[1] = no_fingertip());
         assert_eq!(error, HandError::TooFewFingertips { count: 1 });
-        let error = Hand::<f32, 0, 2>::from_prepared([], fingertips).unwrap_err();
+        let error = refused(|(joints, _)| *joints = [PreparedJoint::still(); 3]);
         assert_eq!(error, HandError::NoJoints);
     }
 }

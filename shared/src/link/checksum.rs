@@ -26,22 +26,22 @@ static TABLE: [u32; 256] = ISO_HDLC.table()[0];
 
 /// The register of a CRC in work. It is advanced by bytes, not by slices, so that each byte costs the same.
 #[derive(Clone, Copy)]
-pub(super) struct Checksum(u32);
+pub(crate) struct Checksum(u32);
 
 impl Checksum {
     /// Before the payload.
-    pub(super) const START: Self = Self(ISO_HDLC.checksum(LEAD) ^ CRC_32_ISO_HDLC.xorout);
+    pub(crate) const START: Self = Self(ISO_HDLC.checksum(LEAD) ^ CRC_32_ISO_HDLC.xorout);
 
     /// Bytes of a CRC.
-    pub(super) const BYTES: usize = 4;
+    pub(crate) const BYTES: usize = 4;
 
-    pub(super) fn advance(&mut self, byte: u8) {
+    pub(crate) fn advance(&mut self, byte: u8) {
         let [low, ..] = self.0.to_le_bytes();
         self.0 = TABLE[usize::from(low ^ byte)] ^ (self.0 >> 8);
     }
 
     /// The CRC of the payload, in the order of sending.
-    pub(super) fn bytes(self) -> [u8; Self::BYTES] {
+    pub(crate) fn bytes(self) -> [u8; Self::BYTES] {
         (self.0 ^ CRC_32_ISO_HDLC.xorout).to_le_bytes()
     }
 

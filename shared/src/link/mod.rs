@@ -37,7 +37,7 @@
 //! that have run together, and noise: of such frames one in 2^32 passes. On a line that damages one frame a second in such
 //! a way, that is one in 136 years; so what is decoded is checked for its meaning, too.
 
-mod checksum;
+pub(crate) mod checksum;
 mod frame;
 mod input;
 pub mod message;

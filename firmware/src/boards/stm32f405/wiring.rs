@@ -24,7 +24,7 @@ use super::serial::LinePins;
 use crate::joints::dac::{self, CHANNELS};
 use crate::joints::ls7366r::{self, FilterClock};
 use crate::joints::{BoardJoints, JointsConfig, OutputConfig};
-use crate::model::{JOINTS, TORQUES_PER_VOLT_NM_V};
+use crate::model::{JOINTS, torques_per_volt_nm_v};
 use core::array;
 use core::convert::Infallible;
 use core::mem::MaybeUninit;
@@ -248,7 +248,7 @@ pub fn joints(
         let Ok(dac) = AtomicDevice::new(dacs, selects.next().expect(ENOUGH), Wait);
         dac
     });
-    let outputs = TORQUES_PER_VOLT_NM_V.map(|nm_per_volt| OutputConfig { nm_per_volt });
+    let outputs = torques_per_volt_nm_v().map(|nm_per_volt| OutputConfig { nm_per_volt });
     let config = JointsConfig { filter_clock: FILTER_CLOCK, outputs };
     HandJoints::new(counters, dacs, pins.enable, &config).expect("the build has checked the hand's scales")
 }

@@ -2,6 +2,8 @@
 
 use super::*;
 use crate::scene::{HandModel, Safety};
+use crate::{MAX_FINGERS, MAX_JOINTS};
+use blindgrasp_shared::model::{decode, torques_per_volt_nm_v};
 
 fn hand_text() -> &'static str {
     Kind::Hand.built_in().iter().find(|(name, _)| *name == "three-finger").unwrap().1
@@ -109,9 +111,12 @@ fn signs_zeros_and_scales_come_from_the_file() {
     let signs_and_zeros = [0, 1, 2].map(|k| (encoders[k].reversed, encoders[k].zero_count));
     assert_eq!(signs_and_zeros, [(true, -7), (false, 9), (false, -7)]);
     assert_eq!(model.torques_per_volt_nm_v[..3], [0.25, -0.25, 0.25]);
-    let source = model.source();
-    assert!(source.contains("TORQUES_PER_VOLT_NM_V: [f32; JOINTS] = [0.25, -0.25, 0.25, 0.25,"), "{source}");
-    assert!(source.contains("Encoder { zero_count: 9, rad_per_count: "), "{source}");
+    let bytes = model.bytes();
+    assert_eq!(torques_per_volt_nm_v::<12>(&bytes).unwrap()[..], model.torques_per_volt_nm_v);
+    assert_eq!(*decode::<MAX_JOINTS, MAX_FINGERS>(&bytes).unwrap().config(), model.config);
+    let mut turned = model.clone();
+    turned.torques_per_volt_nm_v[11] = -0.25;
+    assert_ne!(turned.hash(), model.hash());
     // Unless given: the paper's amplifier, motor and gear.
     let usual = HandModel::load("three-finger").unwrap();
     assert_eq!(usual.torques_per_volt_nm_v, [1.1 * 23.4e-3 * 5.4_f32; 12]);
@@ -156,17 +161,19 @@ fn a_hand_can_have_the_earlier_law() {
     assert_eq!((gains.grasp[1], gains.integral), (0.0, [0.02]));
     // Four times as firmly, if a user asks for it: as with the paper's gains.
     assert_eq!((limits.grasp[1], limits.integral), (Some(0.0), [Some(0.08)]));
+    let params = decode::<MAX_JOINTS, MAX_FINGERS>(&model.bytes()).unwrap();
+    assert_eq!(*params.config(), model.config);
 }
 
 #[test]
-fn the_same_hand_gives_the_same_constants_wherever_it_lies() {
+fn the_same_hand_gives_the_same_bytes_wherever_it_lies() {
     let manifest = Path::new(env!("CARGO_MANIFEST_DIR"));
     let path = manifest.join("../models/hands/three-finger.toml");
     let from_disk = HandModel::load(path.to_str().unwrap()).unwrap();
     let built_in = HandModel::load("three-finger").unwrap();
     assert_eq!(from_disk, built_in);
-    assert_eq!(from_disk.source(), built_in.source());
-    assert_ne!(built_in.source(), HandModel::load("two-finger").unwrap().source());
+    assert_eq!(from_disk.bytes(), built_in.bytes());
+    assert_ne!(built_in.hash(), HandModel::load("two-finger").unwrap().hash());
 }
 
 #[test]
