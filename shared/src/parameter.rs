@@ -20,6 +20,11 @@ impl Text {
     pub const fn plain(text: &'static str) -> Self {
         Self::new("", text)
     }
+
+    /// Returns its bytes.
+    pub fn bytes(self) -> impl Iterator<Item = u8> {
+        self.prefix.bytes().chain(self.rest.bytes())
+    }
 }
 
 impl From<&'static str> for Text {

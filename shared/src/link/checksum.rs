@@ -25,7 +25,7 @@ const ISO_HDLC: Crc<u32, Table<1>> = Crc::<u32, Table<1>>::new(&CRC_32_ISO_HDLC)
 static TABLE: [u32; 256] = ISO_HDLC.table()[0];
 
 /// The register of a CRC in work. It is advanced by bytes, not by slices, so that each byte costs the same.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Debug)]
 pub(crate) struct Checksum(u32);
 
 impl Checksum {
@@ -38,6 +38,11 @@ impl Checksum {
     pub(crate) fn advance(&mut self, byte: u8) {
         let [low, ..] = self.0.to_le_bytes();
         self.0 = TABLE[usize::from(low ^ byte)] ^ (self.0 >> 8);
+    }
+
+    /// The four bytes of a word, low byte first.
+    pub(crate) fn advance_word(&mut self, word: u32) {
+        word.to_le_bytes().into_iter().for_each(|byte| self.advance(byte));
     }
 
     /// The CRC of the payload, in the order of sending.
