@@ -375,7 +375,7 @@ impl Console {
 
     /// The one index, or all that a parameter has.
     fn indices(&self, parameter: Parameter, index: Option<u8>) -> std::ops::Range<u8> {
-        let count = parameter.count(self.joint_count.into());
+        let count = parameter.count(self.joint_count);
         index.map_or(0..count, |index| index..index.saturating_add(1))
     }
 
