@@ -578,7 +578,7 @@ fn what_can_not_be_watched_is_told_before_the_terminal_is_taken() {
 fn the_picture_in_the_readme_is_what_is_shown() {
     let folder = folder();
     // Of a line that has room for what a busy machine sends late.
-    let hand = Hand::serve_with(&folder, &["--baud", "0"]);
+    let hand = Hand::serve_with(&folder, &["--baud", "3000000"]);
     let terminal = Terminal::watching(&hand);
     terminal.press("ay");
     terminal.wait_for_mode("ARMED");

@@ -200,7 +200,7 @@ impl Parameter {
             }
             Place::Limit(k) => {
                 let Gain { key, unit, words, .. } = GAINS[usize::from(k)];
-                let words = Text::new("Most that may be asked for of: ", words);
+                let words = Text::new("Most that may be asked for of ", key);
                 Label { key: Text::new("limits.", key), unit, words }
             }
             Place::Law(k) => {
