@@ -80,7 +80,7 @@ pub fn encode<'b, const J: usize, const F: usize>(
     }
     let (bytes, rest) = buffer.split_at_mut_checked(length).ok_or(BufferTooSmall)?;
     let crc = rest.first_chunk_mut().ok_or(BufferTooSmall)?;
-    *crc = checksum(bytes);
+    *crc = Checksum::of(bytes);
     buffer.get(..length + Checksum::BYTES).ok_or(BufferTooSmall)
 }
 
@@ -118,7 +118,7 @@ type Reader<'a> = Deserializer<'a, Unread<'a>>;
 #[inline(never)]
 fn reader(bytes: &[u8]) -> Result<Reader<'_>, ModelError> {
     let (bytes, crc) = bytes.split_last_chunk().ok_or(ModelError::Damaged)?;
-    if *crc != checksum(bytes) {
+    if *crc != Checksum::of(bytes) {
         return Err(ModelError::Damaged);
     }
     Ok(Deserializer::from_flavor(Unread(bytes)))
@@ -199,10 +199,4 @@ impl<'a> Flavor<'a> for Unread<'a> {
 /// The hash of the hand in what [`encode`] wrote.
 pub fn hash(bytes: &[u8]) -> u32 {
     bytes.last_chunk().map_or(0, |crc| u32::from_le_bytes(*crc))
-}
-
-fn checksum(bytes: &[u8]) -> [u8; Checksum::BYTES] {
-    let mut checksum = Checksum::START;
-    bytes.iter().for_each(|&byte| checksum.advance(byte));
-    checksum.bytes()
 }

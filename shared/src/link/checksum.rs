@@ -35,6 +35,14 @@ impl Checksum {
     /// Bytes of a CRC.
     pub(crate) const BYTES: usize = 4;
 
+    /// The CRC of a payload, in the order of sending.
+    #[inline(never)]
+    pub(crate) fn of(payload: &[u8]) -> [u8; Self::BYTES] {
+        let mut checksum = Self::START;
+        payload.iter().for_each(|&byte| checksum.advance(byte));
+        checksum.bytes()
+    }
+
     pub(crate) fn advance(&mut self, byte: u8) {
         let [low, ..] = self.0.to_le_bytes();
         self.0 = TABLE[usize::from(low ^ byte)] ^ (self.0 >> 8);
