@@ -104,7 +104,8 @@ pub struct ControlEnd<'q> {
 impl ControlEnd<'_> {
     /// The packet for this tick, for whose answer there is room. A stop overtakes whatever waits.
     pub fn take(&mut self) -> Option<HandPacket> {
-        let room = self.answers.capacity().saturating_sub(self.answers.len());
+        let capacity = self.answers.capacity();
+        let room = if is_nothing(capacity) { 0 } else { capacity.saturating_sub(self.answers.len()) };
         let stop = may_take(true, room).then(|| dequeue(&mut self.stops)).flatten();
         stop.or_else(|| may_take(false, room).then(|| dequeue(&mut self.packets)).flatten())
     }

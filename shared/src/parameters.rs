@@ -83,14 +83,19 @@ macro_rules! parameters {
             pub const $name: Self = Self(Number::$name as u8);)*
         }
 
-        /// Returns the field of a row.
-        fn field<const J: usize>(config: &Config<J>, number: Number) -> &dyn Field {
-            match number { $(Number::$name => &config.$group.$($field).+,)* }
+        /// Returns the value of a row.
+        fn get<const J: usize>(config: &Config<J>, number: Number, k: usize) -> Option<f32> {
+            match number { $(Number::$name => config.$group.$($field).+.get(k),)* }
         }
 
-        /// Returns the field of a row, to be changed.
-        fn field_mut<const J: usize>(config: &mut Config<J>, number: Number) -> &mut dyn Field {
-            match number { $(Number::$name => &mut config.$group.$($field).+,)* }
+        /// Sets the value of a row.
+        fn put<const J: usize>(
+            config: &mut Config<J>,
+            number: Number,
+            k: usize,
+            value: Option<f32>,
+        ) -> Result<(), Refusal> {
+            match number { $(Number::$name => config.$group.$($field).+.put(k, value),)* }
         }
     };
 }
@@ -199,7 +204,7 @@ impl Parameter {
                 Label { key: key.into(), unit, words: words.into() }
             }
             Place::Limit(k) => {
-                let Gain { key, unit, words, .. } = GAINS[usize::from(k)];
+                let Gain { key, unit, .. } = GAINS[usize::from(k)];
                 let words = Text::new("Most that may be asked for of ", key);
                 Label { key: Text::new("limits.", key), unit, words }
             }
@@ -375,7 +380,7 @@ impl<const J: usize> Config<J> {
             return Err(Refusal::NoSuchParameter);
         }
         Ok(match parameter.row().place {
-            Place::Row(number) => field(self, number).get(index.into()),
+            Place::Row(number) => get(self, number, index.into()),
             Place::Gain(k) => self.laws.gains.iter().nth(k.into()).copied(),
             Place::Limit(k) => self.limits.gains.iter().nth(k.into()).copied().flatten(),
             Place::Law(k) => Some(if self.laws.chosen.has(k) { 1.0 } else { 0.0 }),
@@ -399,7 +404,7 @@ impl<const J: usize> Config<J> {
         }
         let none = Refusal::NoSuchParameter;
         match parameter.row().place {
-            Place::Row(number) => field_mut(self, number).put(index.into(), value),
+            Place::Row(number) => put(self, number, index.into(), value),
             Place::Gain(k) => self.laws.gains.iter_mut().nth(k.into()).ok_or(none)?.put(0, value),
             Place::Limit(k) => self.limits.gains.iter_mut().nth(k.into()).ok_or(none)?.put(0, value),
             Place::Law(k) => {

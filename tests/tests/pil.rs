@@ -28,6 +28,7 @@ use blindgrasp_tests::images::{DEFAULT_HAND, kept_image, root};
 use std::collections::VecDeque;
 use std::fmt::Write as _;
 use std::fs;
+use std::path::Path;
 use std::time::{Duration, Instant};
 
 const TWO_FINGERS: &str = "models/hands/two-finger.toml";
@@ -140,11 +141,23 @@ fn the_cube_is_grasped_as_in_the_simulation() {
     grasps("cube", DEFAULT_HAND, 10_000, &[]);
 }
 
-/// The earlier law, whose gains reach the image over the link.
+/// The earlier law, whose gain reaches the image over the link, which can't go beyond that of the hand's file.
 #[test]
 fn the_cube_is_grasped_by_the_earlier_law_as_in_the_simulation() {
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR"));
+    let read = |file: &str| fs::read_to_string(root().join("models").join(file)).expect("a model");
+    let write = |name: &str, text: String| {
+        let path = folder.join(name);
+        fs::write(&path, text).expect("a file");
+        path.to_str().expect("UTF-8").to_owned()
+    };
+    let (control, law) = ("[control]\n", "[control]\nintegral_gain_nm_rad = 0.04\n");
+    let hand = write("earlier-law.toml", read("hands/three-finger.toml").replacen(control, law, 1));
+    let of = |hand: &str| format!("hand = \"{hand}\"");
+    let scene = read("scenes/cube.toml").replacen(&of("three-finger"), &of("earlier-law.toml"), 1);
+    let scene = write("earlier-law-cube.toml", scene);
     let settings = ["control.attitude_stiffness_nm=0", "control.integral_gain_nm_rad=0.02"];
-    grasps("cube", DEFAULT_HAND, 5_000, &settings);
+    grasps(&scene, &hand, 5_000, &settings);
 }
 
 #[test]

@@ -5,10 +5,10 @@ use std::path::{Path, PathBuf};
 use tempfile::TempDir;
 
 /// The file of the hand, beside its scene.
-pub const HAND: &str = "patient.toml";
+pub(crate) const HAND: &str = "patient.toml";
 
 /// Writes the scene `cube` with such a hand into a folder, and returns its path.
-pub fn scene(folder: &TempDir, heartbeat_ms: u32) -> PathBuf {
+pub(crate) fn scene(folder: &TempDir, heartbeat_ms: u32) -> PathBuf {
     let models = Path::new(env!("CARGO_MANIFEST_DIR")).join("../models");
     let read = |file: &str| std::fs::read_to_string(models.join(file)).expect("a model");
     let hand = read("hands/three-finger.toml") + &format!("\n[safety]\nheartbeat_ms = {heartbeat_ms}\n");
