@@ -603,8 +603,8 @@ fn shape(picture: &str) -> Vec<Vec<String>> {
     let is_word = |word: &&str| word.starts_with(char::is_alphabetic) && word.is_ascii();
     let row = |row: &str| {
         let words = row.split_whitespace().filter(is_word);
-        // What limits a joint comes and goes, and what the link does is the machine's affair.
-        let changes = ["torque", "slew", "lower", "upper", "each", "only", "kB/s", "device"];
+        // What limits a joint comes and goes, what the link does is the machine's affair, and of the last the row shows a part.
+        let changes = ["torque", "slew", "lower", "upper", "each", "only", "kB/s", "device", "work"];
         let words = words.take_while(|word| !changes.contains(word));
         words.map(|word| word.trim_end_matches(|c: char| !c.is_alphabetic()).to_owned()).collect::<Vec<_>>()
     };

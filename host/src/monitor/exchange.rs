@@ -1,5 +1,7 @@
-//! What can be learnt from the payloads on the line alone: the session's number, and which heartbeats were answered.
+//! What can be learnt from the payloads on the line alone: the session's number, which heartbeats were answered, and which
+//! numbers of records stand for input records.
 
+use super::model::News;
 use crate::MAX_JOINTS;
 use crate::wire::{Packet, Request};
 use blindgrasp_shared::link::message::Reply;
@@ -7,9 +9,10 @@ use std::collections::VecDeque;
 
 /// Heartbeats whose answers may still come.
 const UNANSWERED: usize = 64;
-/// First byte of the replies that matter (`docs/protocol.md`): records, which come much more often, are left alone.
+/// First byte of the replies that matter (`docs/protocol.md`): records, which come more often, are left alone.
 const IDENTITY: u8 = 0;
 const ANSWER: u8 = 1;
+const INPUT: u8 = 6;
 
 /// Payloads in both directions.
 #[derive(Clone, Debug, Default)]
@@ -29,23 +32,25 @@ impl Exchange {
         }
     }
 
-    /// What the device said; returns whether that is that a heartbeat has come.
-    pub(super) fn received(&mut self, payload: &[u8]) -> bool {
-        if !matches!(payload.first(), Some(&(IDENTITY | ANSWER))) {
-            return false;
+    /// Takes what the device said; returns what follows from it.
+    pub(super) fn received(&mut self, payload: &[u8]) -> Option<News> {
+        if !matches!(payload.first(), Some(&(IDENTITY | ANSWER | INPUT))) {
+            return None;
         }
         match Reply::<MAX_JOINTS>::decode(payload) {
             Ok(Reply::Identity { session, .. }) => {
                 self.session = Some(session);
                 self.heartbeats.clear();
-                false
+                None
             }
             Ok(Reply::Answer { sequence, refused: None }) => {
-                let at = self.heartbeats.iter().position(|&heartbeat| heartbeat == sequence);
+                let at = self.heartbeats.iter().position(|&heartbeat| heartbeat == sequence)?;
                 // Those before it will not be answered any more.
-                at.inspect(|&at| drop(self.heartbeats.drain(..=at))).is_some()
+                self.heartbeats.drain(..=at);
+                Some(News::Heartbeat)
             }
-            _ => false,
+            Ok(Reply::Input(input)) => Some(News::Input { sequence: input.sequence }),
+            _ => None,
         }
     }
 
@@ -78,13 +83,14 @@ mod tests {
             exchange.sent(&packet(sequence, Request::Heartbeat));
         }
         exchange.sent(&packet(3, Request::Command(Command::Arm)));
-        assert!(exchange.received(&answer(2, None)));
-        assert!(!exchange.received(&answer(1, None)), "overtaken");
-        assert!(!exchange.received(&answer(3, None)), "of something else");
-        assert!(!exchange.received(&answer(4, Some(Refusal::NoSession))));
-        assert!(exchange.received(&answer(4, None)));
-        assert!(!exchange.received(&answer(4, None)), "twice");
-        assert!(!exchange.received(&[]) && !exchange.received(&[ANSWER]) && !exchange.received(&[3, 3, 3]));
+        let mut counts = |payload: &[u8]| matches!(exchange.received(payload), Some(News::Heartbeat));
+        assert!(counts(&answer(2, None)));
+        assert!(!counts(&answer(1, None)), "overtaken");
+        assert!(!counts(&answer(3, None)), "of something else");
+        assert!(!counts(&answer(4, Some(Refusal::NoSession))));
+        assert!(counts(&answer(4, None)));
+        assert!(!counts(&answer(4, None)), "twice");
+        assert!(!counts(&[]) && !counts(&[ANSWER]) && !counts(&[3, 3, 3]));
         for sequence in 0..1000 {
             exchange.sent(&packet(sequence, Request::Heartbeat));
         }

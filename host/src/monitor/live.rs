@@ -291,8 +291,8 @@ impl Follower {
         match event {
             Event::Sent(payload) => exchange.sent(&payload),
             Event::Received(payload) => {
-                if exchange.received(&payload) {
-                    self.news(News::Heartbeat);
+                if let Some(news) = exchange.received(&payload) {
+                    self.news(news);
                 }
             }
             Event::Open { firmware, period_us, ends_another } => {

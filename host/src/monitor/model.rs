@@ -67,6 +67,11 @@ pub enum News {
     Open(Box<Session>),
     /// A tick's record came.
     Record(Box<Record>),
+    /// An input record came in place of a tick's record.
+    Input {
+        /// Its number, in one row with records.
+        sequence: u32,
+    },
     /// The device has answered a heartbeat.
     Heartbeat,
     /// A parameter's value; `None` if what it belongs to is switched off.
@@ -248,6 +253,7 @@ impl Model {
         match news {
             News::Open(session) => self.open(*session),
             News::Record(record) => self.look(at, *record),
+            News::Input { sequence } => self.number(sequence),
             News::Heartbeat => self.heartbeat_at = Some(at),
             News::Setting { parameter, index, value } => self.set(parameter, index, value),
             News::Traffic { bytes, damaged } => {
@@ -316,15 +322,20 @@ impl Model {
             // A recording can go on after a gap without another session.
             self.link = Link::Open;
         }
-        // A number that is not ahead is that of a device that counts anew.
-        let ahead = self.sequence.map(|last| record.sequence.wrapping_sub(last));
-        if let Some(ahead) = ahead.filter(|ahead| (1..1 << 31).contains(ahead)) {
-            self.lost += u64::from(ahead) - 1;
-        }
-        self.sequence = Some(record.sequence);
+        self.number(record.sequence);
         self.remember_counts(&record);
         self.record = Some((at, record));
         self.remember(at);
+    }
+
+    /// Counts what is missing before a number.
+    fn number(&mut self, sequence: u32) {
+        // A number that is not ahead is that of a device that counts anew.
+        let ahead = self.sequence.map(|last| sequence.wrapping_sub(last));
+        if let Some(ahead) = ahead.filter(|ahead| (1..1 << 31).contains(ahead)) {
+            self.lost += u64::from(ahead) - 1;
+        }
+        self.sequence = Some(sequence);
     }
 
     fn remember_counts(&mut self, record: &Record) {

@@ -250,8 +250,8 @@ impl Playback {
                 // COBS adds a byte to each 254.
                 let bytes = payload.len() as u64 + FRAME_BYTES + payload.len() as u64 / 254;
                 tell(News::Traffic { bytes, damaged: 0 });
-                if self.exchange.received(payload) {
-                    tell(News::Heartbeat);
+                if let Some(news) = self.exchange.received(payload) {
+                    tell(news);
                 }
             }
             What::Sent(payload) => self.exchange.sent(payload),

@@ -6,6 +6,7 @@ use super::clock::Clock;
 use super::reader::{Entry, What};
 use super::{RecordingError, Stamp};
 use crate::MAX_JOINTS;
+use blindgrasp_shared::command::Answer;
 use blindgrasp_shared::estimate::{Estimator, Tracks};
 use blindgrasp_shared::link::InputRecord;
 use blindgrasp_shared::link::message::Reply;
@@ -57,6 +58,10 @@ pub enum Arrival {
     Input {
         /// Records that are missing between the one before and this one.
         lost_before: u64,
+        /// When its tick was.
+        at: Stamp,
+        /// The command of its tick, and what became of it.
+        answer: Option<Answer>,
     },
     /// Something else that the device says.
     Reply,
@@ -176,10 +181,11 @@ impl Track {
         }
         match Reply::decode(payload) {
             Ok(Reply::Record(record)) => Arrival::Record(Box::new(self.record(record, arrived))),
-            Ok(Reply::Input(InputRecord { sequence, tick, counts, .. })) => {
+            Ok(Reply::Input(InputRecord { sequence, tick, counts, answer, .. })) => {
                 let record = Record { sequence, tick, counts, decimation: 1, ..Record::BLANK };
                 // Clock and estimator go on with it.
-                Arrival::Input { lost_before: self.record(record, arrived).lost_before }
+                let Decoded { lost_before, at, .. } = self.record(record, arrived);
+                Arrival::Input { lost_before, at, answer }
             }
             Ok(_) => Arrival::Reply,
             Err(_) => Arrival::Unusable,

@@ -8,6 +8,7 @@ use super::message::{Level, LinkStatus, Log, write_tick};
 use super::{CHANNELS, Device, FORMAT, Kind, LIBRARY, METADATA, PROFILE, SIGNALS, Stamp, schema, seal};
 use ::mcap::records::{MessageHeader, Metadata};
 use ::mcap::{Attachment, Compression, WriteOptions};
+use blindgrasp_shared::command::Answer;
 use blindgrasp_shared::fault::Raised;
 use blindgrasp_shared::link::most_bytes;
 use blindgrasp_shared::supervisor::Mode;
@@ -248,11 +249,12 @@ impl Writer {
         recorded.status.bytes += most_bytes(payload.len()) as u64;
         match &arrival {
             Arrival::Record(decoded) => self.tick(device, decoded)?,
-            Arrival::Input { lost_before } => {
+            &Arrival::Input { lost_before, at, answer } => {
                 self.records += 1;
                 recorded.status.records += 1;
                 recorded.status.inputs += 1;
                 recorded.status.missing += lost_before;
+                self.answer(device, at, answer)?;
             }
             Arrival::Reply => {}
             Arrival::Unusable => recorded.status.unusable += 1,
@@ -294,11 +296,14 @@ impl Writer {
                 None => self.log(device, decoded.at, Level::Info, "fault", "the fault is cleared")?,
             }
         }
-        if let Some(answer) = record.answer {
-            let level = if answer.refused.is_some() { Level::Warning } else { Level::Info };
-            self.log(device, decoded.at, level, "answer", &answer.to_string())?;
-        }
-        Ok(())
+        self.answer(device, decoded.at, record.answer)
+    }
+
+    /// Tells what became of a tick's command.
+    fn answer(&mut self, device: Device, at: Stamp, answer: Option<Answer>) -> Result<(), RecordingError> {
+        let Some(answer) = answer else { return Ok(()) };
+        let level = if answer.refused.is_some() { Level::Warning } else { Level::Info };
+        self.log(device, at, level, "answer", &answer.to_string())
     }
 
     fn in_words(&self, device: Device, raised: Raised) -> String {
