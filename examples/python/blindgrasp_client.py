@@ -950,7 +950,10 @@ def run(args, out):
     printer = Printer(getattr(args, "csv", False), out)
     settings = [parameter(args.key)] if args.command in ("get", "set") else []
     # A stop is of nobody's session, without a hello, and goes to a hand that another program leads, too.
-    session = Session(Line.open(args.port, alone=args.command != "stop"), printer)
+    # Records on the line may still be those that another program has asked for.
+    shows_records = args.command in ("watch", "burst", "grasp")
+    heard = printer if shows_records else lambda record: None
+    session = Session(Line.open(args.port, alone=args.command != "stop"), heard)
     if args.command == "stop":
         session.command("Stop")
         return 0

@@ -203,7 +203,7 @@ fn parameters_that_change_are_taken_over_with_the_next_snapshot() {
 fn a_flipped_bit_is_found_in_its_tick() {
     // It shows in a full record by itself, and in the digest of an input record.
     for (bit, waiting, what) in
-        [(0, 0, "torque, N m,"), (20, 0, "torque, N m,"), (0, 2, "digest of all that the tick computed")]
+        [(0, 0, "torque_nm"), (20, 0, "torque_nm"), (0, 2, "digest of all that the tick computed")]
     {
         let (_folder, path) = folder();
         let mut session = armed(&path);

@@ -107,7 +107,10 @@ fn bad_input_is_told() {
         (vec!["info", "--port", "/dev/no-such-port"], "cannot open /dev/no-such-port: No such file"),
         (vec!["info", "--port", "unix:/no/socket"], "cannot open unix:/no/socket: No such file"),
         (vec!["info", "--port", "/dev/null"], "/dev/null is no serial port"),
-        (vec!["get", "--port", "/dev/null", "force"], "there is no parameter force; there are force_n, "),
+        (
+            vec!["get", "--port", "/dev/null", "force"],
+            "there is no parameter force; there are damping_nm_s, ",
+        ),
         (vec!["get", "--port", "/dev/null", "limits.torque_nm[x]"], "an index is a number in brackets"),
         (vec!["set", "--port", "/dev/null", "force_n", "nan"], "nan is not a finite number"),
         (vec!["watch", "--port", "/dev/null", "--decimation", "0"], "--decimation is from 1 to 65535"),
@@ -252,7 +255,7 @@ mod emulated {
 
         let (code, out, err) = ask(&["get", "limits.torque_nm[3]"]);
         assert_eq!(code, Some(0), "{err}");
-        let told: f32 = out.trim().parse().expect("a number");
+        let told: f32 = out.trim().parse().unwrap_or_else(|_| panic!("no number: {out}"));
         assert_eq!(Some(told), model.config.limits.torque_nm.map(|limits| limits[3]));
         let (code, _, err) = ask(&["get", "limits.torque_nm[12]"]);
         assert_eq!(code, Some(1));

@@ -135,7 +135,11 @@ impl Plan {
             return Err(PilError::IdealSensors);
         }
         let hand = HandModel::of(scene)?;
-        let config = scene.controller_config();
+        let mut config = scene.controller_config();
+        // How firm a grasp may be asked for is the file's affair: a scene asks for its own.
+        for (limit, file) in config.limits.gains.iter_mut().zip(hand.config.limits.gains.iter()) {
+            *limit = limit.map(|limit| file.map_or(limit, |file| limit.min(file)));
+        }
         let (firmware_us, scene_us) = (hand.config.period_us, config.period_us);
         if firmware_us != scene_us {
             return Err(PilError::OtherPeriod { firmware_us, scene_us });

@@ -60,7 +60,7 @@ fn assert_says(error: &str, words: &[&str]) {
 fn a_run_is_that_of_a_simulation() {
     let others = [
         "sensors.noise_counts=0.4",
-        "control.force_n=3",
+        "control.force_n=16",
         "control.attitude_stiffness_nm=1e-3",
         "control.damping_scale=1.5",
         "control.soft_start_s=0.4",
