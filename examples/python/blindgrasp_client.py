@@ -673,6 +673,8 @@ class Session:
             except Trouble as trouble:
                 if time.monotonic() > deadline or "no answer" not in str(trouble):
                     raise
+        # What came before was on its way to another program, which may have hung up in the middle of a frame.
+        self.frames.damaged = 0
         self.identity, self.number = reply["Identity"]["identity"], reply["Identity"]["session"]
         theirs = self.identity["image"]["interface_version"]
         if theirs != INTERFACE_VERSION:
@@ -951,7 +953,7 @@ def run(args, out):
     settings = [parameter(args.key)] if args.command in ("get", "set") else []
     # A stop is of nobody's session, without a hello, and goes to a hand that another program leads, too.
     # Records on the line may still be those that another program has asked for.
-    shows_records = args.command in ("watch", "burst", "grasp")
+    shows_records = args.command in ("watch", "grasp")
     heard = printer if shows_records else lambda record: None
     session = Session(Line.open(args.port, alone=args.command != "stop"), heard)
     if args.command == "stop":

@@ -1,4 +1,4 @@
-//! The board with an STM32F405RG: its pins, clocks and scales ([`wiring`]), its start, its line, its supply.
+//! The board with an STM32F405RG: its pins, clocks and scales (`wiring.rs`), its start, its line, its supply.
 //!
 //! On the host only the parts without hardware are there, for their tests.
 
