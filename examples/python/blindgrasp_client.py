@@ -360,6 +360,10 @@ PACKET = Struct(
         Burst=Struct(index=U16),
         Goodbye=None,
         Rate=Struct(baud=U32),
+        Zero=Struct(joint=Option(BYTE)),
+        Confirm=None,
+        Save=None,
+        Defaults=None,
     ),
 )
 FIELDS = {
@@ -412,6 +416,7 @@ IDENTITY = Struct(
     clock_hz=U32,
     most_baud=U32,
     changed=Unsigned(64),
+    restored=Struct(saved=U16, ignored=U16),
 )
 REPLY = Enum(
     Identity=Struct(sequence=U16, session=U16, identity=IDENTITY, ends_another=BOOL),

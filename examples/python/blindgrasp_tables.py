@@ -43,12 +43,19 @@ REFUSALS = {
     "BeyondFile": "this is looser than the hand's file, and the line can only tighten: `get` shows what the file says",
     "SessionTaken": "another program has said hello to this hand since, which ended this session: only one may lead it",
     "NoSuchRate": "this hand's line does not have this rate",
+    "Unconfirmed": "signs or zeros were set: look at the angles, and confirm them, first",
+    "NotRead": "the joints can't be read: see the fault",
+    "Saving": "parameters are being saved: wait for the answer",
+    "NoStore": "this hand has nothing to save to: an emulator has no flash",
+    "NoSpare": "no room is left to save to: a reset of the board makes some",
+    "NotSaved": "the flash did not take it; what was saved before is valid",
 }
 EVENTS = {
     "heartbeat": 1,
     "late": 2,
     "fallback_clock": 4,
     "supply_low": 8,
+    "unconfirmed": 16,
 }
 LIMITS = {
     "torque": 1,
@@ -92,6 +99,9 @@ PARAMETERS = [
     "supervisor.soft_start_ms",
     "supervisor.release_ms",
     "supervisor.amplifier_start_ms",
+    "encoder_reversed",
+    "encoder_zero_count",
+    "motor_reversed",
     "force_n",
     "attitude_stiffness_nm",
     "integral_gain_nm_rad",

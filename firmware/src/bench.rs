@@ -7,16 +7,16 @@
 //! Everything is measured in a grasp that has its full force, with joints that move, and the largest of many ticks is
 //! told.
 
-use crate::control::{Control, Timing};
-use crate::joints::Joints;
+use crate::control::Control;
 use crate::link::MOST_SENT;
 use crate::model::{FINGERS, JOINTS, params};
 use crate::semihosting::File;
 use blindgrasp_shared::command::{Command, Grasp};
 use blindgrasp_shared::control::{Latch, LawsConfig, Stance};
-use blindgrasp_shared::device::Reading;
+use blindgrasp_shared::device::Inputs;
 use blindgrasp_shared::fault::Raised;
 use blindgrasp_shared::hand::Posture;
+use blindgrasp_shared::joints::{Joints, Reading};
 use blindgrasp_shared::link::encode;
 use blindgrasp_shared::link::message::{Form, Packet, Reply, Request, Signals};
 use blindgrasp_shared::supervisor::Mode;
@@ -105,7 +105,7 @@ impl Swinging<'_> {
 }
 
 impl Joints<JOINTS> for Swinging<'_> {
-    fn read(&mut self) -> Reading<JOINTS> {
+    fn collect(&mut self) -> Reading<JOINTS> {
         self.tick += 1;
         let angles_rad = self.angles_rad();
         let encoders = &self.params.config().estimator.encoders;
@@ -182,12 +182,13 @@ fn whole_tick(
         let packet = Packet { session, sequence: tick as u16, request };
         let mut outputs = None;
         let instructions = counter.instructions(|| {
-            outputs = Some(control.turn(black_box(&mut joints), Some(packet), Timing::default(), 0, 0));
+            let inputs = Inputs { packet: Some(packet), ..Inputs::default() };
+            outputs = Some(control.turn(black_box(&mut joints), &inputs));
         });
         // What making up the joints took is not the tick's.
         let idle = counter.instructions(|| {
             joints.tick -= 1;
-            black_box(joints.read());
+            black_box(joints.collect());
         });
         let Some(outputs) = outputs else { return Err("there was no tick") };
         match outputs.reply {

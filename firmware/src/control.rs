@@ -2,22 +2,16 @@
 //!
 //! Nothing is decided here: what the hand does is in [`Device`], the same code on the host.
 
-use crate::joints::Joints;
 use crate::model::{FINGERS, JOINTS};
-use crate::queue::HandPacket;
 #[cfg(target_os = "none")]
 use crate::{
     board::supply,
     queue::{self, ControlEnd, Telemetry},
     schedule::Turn,
 };
-use blindgrasp_shared::command::{Answer, Command};
-use blindgrasp_shared::device::{Device, Inputs, Outputs, Reading};
-use blindgrasp_shared::fault::Raised;
+use blindgrasp_shared::device::{Device, Inputs, Outputs};
+use blindgrasp_shared::joints::Joints;
 use blindgrasp_shared::telemetry::burst::Burst;
-
-/// A fault that was cleared.
-const CLEARED: Answer = Answer { command: Command::ClearFault, refused: None };
 
 /// The records around a fault.
 pub type HandBurst = Burst<JOINTS>;
@@ -27,8 +21,6 @@ pub type HandBurst = Burst<JOINTS>;
 pub struct Timing {
     /// It missed its deadline.
     pub late: bool,
-    /// The supply was too low at some time since it began.
-    pub supply_low: bool,
     /// Processor cycles that it took; zero where they can't be counted.
     pub cycles: u32,
 }
@@ -42,9 +34,18 @@ pub fn task(
     last: Timing,
 ) -> Timing {
     let turn = Turn::begin();
-    let packet = queues.take();
-    let last = Timing { supply_low: supply::take(), ..last };
-    let outputs = control.turn(joints, packet, last, queues.dropped(), queues.waiting());
+    joints.start();
+    let inputs = Inputs {
+        late: last.late,
+        supply_low: supply::take(),
+        cycles: last.cycles,
+        dropped: queues.dropped(),
+        waiting: queues.waiting(),
+        packet: queues.take(),
+        no_room: queues.room() == 0,
+        stored: queues.stored(),
+    };
+    let outputs = control.turn(joints, &inputs);
     if let Some(reply) = outputs.reply {
         queues.answer(queue::Answer { reply, baud: outputs.baud });
     }
@@ -54,6 +55,9 @@ pub fn task(
     if let Some(part) = outputs.part {
         queues.tell(Telemetry::Part(part));
     }
+    if let Some(order) = outputs.order {
+        queues.order(order);
+    }
     turn.end()
 }
 
@@ -62,14 +66,12 @@ pub struct Control {
     device: Device<JOINTS, FINGERS>,
     /// Too large for a stack.
     burst: &'static mut HandBurst,
-    /// What went wrong when the joints were last written.
-    failed: Option<Raised>,
 }
 
 impl Control {
     /// Before the first turn.
     pub fn new(device: Device<JOINTS, FINGERS>, burst: &'static mut HandBurst) -> Self {
-        Self { device, burst, failed: None }
+        Self { device, burst }
     }
 
     /// The hand.
@@ -77,25 +79,8 @@ impl Control {
         &self.device
     }
 
-    /// One turn. Torques that could not be written are a failed reading in the next. Joints that failed work again when
-    /// the tick has taken the user's command to clear the fault, and not before.
-    pub fn turn(
-        &mut self,
-        joints: &mut impl Joints<JOINTS>,
-        packet: Option<HandPacket>,
-        last: Timing,
-        dropped: u32,
-        waiting: usize,
-    ) -> Outputs<JOINTS> {
-        let read = joints.read();
-        let reading = self.failed.take().map_or(read, Reading::Failed);
-        let Timing { late, supply_low, cycles } = last;
-        let inputs = Inputs { reading, late, supply_low, cycles, dropped, waiting, packet };
-        let outputs = self.device.tick(&inputs, self.burst);
-        if outputs.record.answer == Some(CLEARED) {
-            joints.recover();
-        }
-        self.failed = joints.write(&outputs.torques_nm, outputs.powered);
-        outputs
+    /// One turn, as [`Device::turn`] does it.
+    pub fn turn(&mut self, joints: &mut impl Joints<JOINTS>, inputs: &Inputs<JOINTS>) -> Outputs<JOINTS> {
+        self.device.turn(joints, inputs, self.burst)
     }
 }

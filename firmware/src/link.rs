@@ -306,7 +306,7 @@ mod tests {
             wire.say(sequence, Request::Heartbeat);
         }
         let mut queues = Queues::new();
-        let (mut control, end) = queues.split();
+        let (mut control, end, _) = queues.split();
         settle(&mut Link::new(&mut wire, end));
         let taken: Vec<u16> = core::iter::from_fn(|| control.take()).map(|packet| packet.sequence).collect();
         let busy: Vec<_> =
@@ -328,7 +328,7 @@ mod tests {
         ) {
             let wire = RefCell::new(Wire { every, ..Wire::default() });
             let mut queues = Queues::new();
-            let (mut control, end) = queues.split();
+            let (mut control, end, _) = queues.split();
             let mut link = Link::new(&wire, end);
             let (mut sequence, mut taken) = (0_u16, Vec::new());
             let mut tick = || match control.take() {
@@ -382,7 +382,7 @@ mod tests {
         }
         wire.say(9, Request::Command(Command::Stop));
         let mut queues = Queues::new();
-        let (mut control, end) = queues.split();
+        let (mut control, end, _) = queues.split();
         settle(&mut Link::new(&mut wire, end));
         assert_eq!(wire.answers(), [(7, Some(Refusal::Busy)), (8, Some(Refusal::Busy))]);
         assert_eq!(control.take().map(|packet| packet.sequence), Some(9));
@@ -393,7 +393,7 @@ mod tests {
     fn replies_are_sent_whole_and_in_order() {
         let mut wire = Wire::default();
         let mut queues = Queues::new();
-        let (mut control, end) = queues.split();
+        let (mut control, end, _) = queues.split();
         for sequence in 0..5 {
             control.answer(Reply::Answer { sequence, refused: None }.into());
         }
@@ -406,7 +406,7 @@ mod tests {
     fn the_rate_changes_once_the_answer_has_left_and_comes_back_by_itself() {
         let mut wire = Wire { every: 5, ..Wire::default() };
         let mut queues = Queues::new();
-        let (mut control, end) = queues.split();
+        let (mut control, end, _) = queues.split();
         for (sequence, baud) in [(1, None), (2, Some(3_000_000)), (3, None)] {
             control.answer(Answer { reply: Reply::Answer { sequence, refused: None }, baud });
         }
@@ -429,7 +429,7 @@ mod tests {
         wire.incoming.extend(damaged);
         wire.say(78, Request::Heartbeat);
         let mut queues = Queues::new();
-        let (mut control, end) = queues.split();
+        let (mut control, end, _) = queues.split();
         let mut link = Link::new(&mut wire, end);
         settle(&mut link);
         assert_eq!((link.counters().good, link.counters().refused()), (2, 1));

@@ -16,7 +16,7 @@ pub fn params() -> Params<JOINTS, FINGERS> {
     model::decode(MODEL).expect(DAMAGED)
 }
 
-/// Torque at each joint for each volt at its amplifier, N m/V; negative where the motor is reversed.
+/// Torque at each joint for each volt at its amplifier, N m/V.
 ///
 /// # Panics
 /// As [`params`].

@@ -8,14 +8,14 @@
 //!
 //! Nothing here knows of time: the simulation may be faster or slower than the world.
 
-use crate::control::{Control, Timing};
-use crate::joints::Joints;
+use crate::control::Control;
 use crate::link::{Frames, MOST_SENT, Received, refused};
 use crate::model::JOINTS;
 use crate::queue::{HandPacket, HandReply};
 use blindgrasp_shared::command::Refusal;
-use blindgrasp_shared::device::Reading;
+use blindgrasp_shared::device::Inputs;
 use blindgrasp_shared::fault::{Fault, Raised};
+use blindgrasp_shared::joints::{Joints, Reading};
 use blindgrasp_shared::link::encode;
 use blindgrasp_shared::link::message::{Reply, Request, Sample};
 use heapless::Deque;
@@ -35,7 +35,7 @@ pub trait Way {
 struct Remote<'s>(&'s Sample<JOINTS>);
 
 impl Joints<JOINTS> for Remote<'_> {
-    fn read(&mut self) -> Reading<JOINTS> {
+    fn collect(&mut self) -> Reading<JOINTS> {
         let Sample { counts, failed, .. } = self.0;
         match (failed, counts.as_slice().try_into()) {
             (Some(raised), Ok(counts)) => Reading::Tested { raised: *raised, counts },
@@ -90,9 +90,9 @@ impl<'c, W: Way> Lockstep<'c, W> {
 
     fn tick(&mut self, sample: &Sample<JOINTS>) -> Option<()> {
         let packet = self.waiting.pop_front();
-        let last = Timing { late: sample.late, supply_low: false, cycles: self.cycles };
+        let inputs = Inputs { late: sample.late, cycles: self.cycles, packet, ..Inputs::default() };
         let began = (self.cycle_count)();
-        let outputs = self.control.turn(&mut Remote(sample), packet, last, 0, 0);
+        let outputs = self.control.turn(&mut Remote(sample), &inputs);
         self.cycles = (self.cycle_count)().wrapping_sub(began);
         let record = Reply::Record(outputs.record);
         match &outputs.reply {

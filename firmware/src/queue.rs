@@ -9,8 +9,11 @@ use blindgrasp_shared::command::Command;
 use blindgrasp_shared::device::WAITING_MOST;
 use blindgrasp_shared::link::may_take;
 use blindgrasp_shared::link::message::{Form, Packet, Reply, Request};
+use blindgrasp_shared::saved::Order;
+use blindgrasp_shared::store::{Store, StoreError};
 use blindgrasp_shared::telemetry::Record;
 use blindgrasp_shared::telemetry::snapshot::Part;
+use embedded_storage::nor_flash::NorFlash;
 use heapless::spsc::{Consumer, Producer, Queue};
 
 /// A packet to this hand.
@@ -59,29 +62,55 @@ const RECORDS: usize = WAITING_MOST + 1;
 /// A second stop before the first is acted on says nothing new.
 const STOPS: usize = 2;
 
+/// The store is told one thing at a time.
+const ORDERS: usize = 2;
+
+/// What became of an order.
+pub type Stored = Result<(), StoreError>;
+
 /// Memory of all queues.
 pub struct Queues {
     stops: Queue<HandPacket, STOPS>,
     packets: Queue<HandPacket, PACKETS>,
     answers: Queue<Answer, ANSWERS>,
     records: Queue<Telemetry, RECORDS>,
+    orders: Queue<Order, ORDERS>,
+    stored: Queue<Stored, ORDERS>,
 }
 
 impl Queues {
     /// Empty queues.
     pub const fn new() -> Self {
-        Self { stops: Queue::new(), packets: Queue::new(), answers: Queue::new(), records: Queue::new() }
+        Self {
+            stops: Queue::new(),
+            packets: Queue::new(),
+            answers: Queue::new(),
+            records: Queue::new(),
+            orders: Queue::new(),
+            stored: Queue::new(),
+        }
     }
 
-    /// Their ends: the control task's, and the link's.
-    pub fn split(&mut self) -> (ControlEnd<'_>, LinkEnd<'_>) {
+    /// Their ends: the control task's, the link's, and the store's.
+    pub fn split(&mut self) -> (ControlEnd<'_>, LinkEnd<'_>, StoreEnd<'_>) {
         let (stops_in, stops) = self.stops.split();
         let (packets_in, packets) = self.packets.split();
         let (answers_in, answers) = self.answers.split();
         let (records_in, records) = self.records.split();
+        let (orders_in, orders) = self.orders.split();
+        let (stored_in, stored) = self.stored.split();
         (
-            ControlEnd { stops, packets, answers: answers_in, records: records_in, dropped: 0 },
+            ControlEnd {
+                stops,
+                packets,
+                answers: answers_in,
+                records: records_in,
+                orders: orders_in,
+                stored,
+                dropped: 0,
+            },
             LinkEnd { stops: stops_in, packets: packets_in, answers, records },
+            StoreEnd { orders, stored: stored_in },
         )
     }
 }
@@ -98,16 +127,34 @@ pub struct ControlEnd<'q> {
     packets: Consumer<'q, HandPacket>,
     answers: Producer<'q, Answer>,
     records: Producer<'q, Telemetry>,
+    orders: Producer<'q, Order>,
+    stored: Consumer<'q, Stored>,
     dropped: u32,
 }
 
 impl ControlEnd<'_> {
     /// The packet for this tick, for whose answer there is room. A stop overtakes whatever waits.
     pub fn take(&mut self) -> Option<HandPacket> {
-        let capacity = self.answers.capacity();
-        let room = if is_nothing(capacity) { 0 } else { capacity.saturating_sub(self.answers.len()) };
+        let room = self.room();
         let stop = may_take(true, room).then(|| dequeue(&mut self.stops)).flatten();
         stop.or_else(|| may_take(false, room).then(|| dequeue(&mut self.packets)).flatten())
+    }
+
+    /// How many answers there is room for.
+    pub fn room(&self) -> usize {
+        let capacity = self.answers.capacity();
+        if is_nothing(capacity) { 0 } else { capacity.saturating_sub(self.answers.len()) }
+    }
+
+    /// Gives the store something to do. It has done all that it was told before.
+    pub fn order(&mut self, order: Order) {
+        // There is room, so this can't fail.
+        let _ = enqueue(&mut self.orders, order);
+    }
+
+    /// What became of it, once it is done.
+    pub fn stored(&mut self) -> Option<Stored> {
+        dequeue(&mut self.stored)
     }
 
     /// Leaves the answer to the packet that was taken for the line. There is room for it.
@@ -130,6 +177,22 @@ impl ControlEnd<'_> {
     /// How many records and parts were dropped so far.
     pub fn dropped(&self) -> u32 {
         self.dropped
+    }
+}
+
+/// The store's end.
+pub struct StoreEnd<'q> {
+    orders: Consumer<'q, Order>,
+    stored: Producer<'q, Stored>,
+}
+
+impl StoreEnd<'_> {
+    /// Does what the control task has told the store, if there is one.
+    pub fn poll<S: NorFlash>(&mut self, store: &mut Option<Store<S>>, hand_hash: u32) {
+        if let (Some(store), Some(order)) = (store, dequeue(&mut self.orders)) {
+            // There is room, so this can't fail.
+            let _ = enqueue(&mut self.stored, store.obey(&order, hand_hash));
+        }
     }
 }
 
@@ -192,8 +255,9 @@ pub fn dequeue<T>(queue: &mut Consumer<'_, T>) -> Option<T> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use blindgrasp_shared::device::{Device, Inputs, Reading};
+    use blindgrasp_shared::device::{Device, Inputs};
     use blindgrasp_shared::identity::{Clock, Identity, Image};
+    use blindgrasp_shared::joints::Reading;
     use blindgrasp_shared::telemetry::burst::Burst;
     use proptest::prelude::*;
     use std::boxed::Box;
@@ -205,7 +269,7 @@ mod tests {
     #[test]
     fn a_stop_overtakes_packets_and_gets_in_when_their_queue_is_full() {
         let mut queues = Queues::new();
-        let (mut control, mut link) = queues.split();
+        let (mut control, mut link, _) = queues.split();
         let most = (PACKETS - 1) as u16;
         for sequence in 0..most {
             assert!(link.put(packet(sequence, Request::Heartbeat)).is_ok());
@@ -222,23 +286,19 @@ mod tests {
         let hand = crate::model::params();
         let image = Image::decode(&crate::model::IMAGE_HAND).unwrap();
         let identity = Identity::of(image, Clock::Emulated);
-        let inputs = Inputs {
-            reading: Reading::Counts([0; JOINTS]),
-            late: false,
-            supply_low: false,
-            cycles: 0,
-            dropped: 0,
-            waiting: 0,
-            packet: None,
-        };
         let mut burst = Box::new(Burst::new());
-        Telemetry::Record(Device::new(hand, identity).tick(&inputs, &mut burst).record, Form::Input)
+        Telemetry::Record(
+            Device::new(hand, identity)
+                .tick(&Reading::Counts([0; JOINTS]), &Inputs::default(), &mut burst)
+                .record,
+            Form::Input,
+        )
     }
 
     #[test]
     fn records_that_do_not_fit_are_counted_and_answers_have_room_and_go_first() {
         let mut queues = Queues::new();
-        let (mut control, mut link) = queues.split();
+        let (mut control, mut link, _) = queues.split();
         for _ in 0..RECORDS + 2 {
             control.tell(record());
         }
@@ -265,7 +325,7 @@ mod tests {
             steps in proptest::collection::vec(0..4_u8, 1..300),
         ) {
             let mut queues = Queues::new();
-            let (mut control, mut link) = queues.split();
+            let (mut control, mut link, _) = queues.split();
             let (mut stops_wait, mut last_was_stop) = (0, false);
             for step in steps {
                 match step {

@@ -49,10 +49,6 @@ impl Turn {
 
     /// Ends it. It is late if the timer has called for the next one already.
     pub fn end(self) -> Timing {
-        Timing {
-            late: SCB::is_pendst_pending(),
-            supply_low: false,
-            cycles: DWT::cycle_count().wrapping_sub(self.began),
-        }
+        Timing { late: SCB::is_pendst_pending(), cycles: DWT::cycle_count().wrapping_sub(self.began) }
     }
 }

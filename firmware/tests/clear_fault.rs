@@ -2,12 +2,12 @@
 
 mod model;
 
-use blindgrasp_firmware::control::{Control, HandBurst, Timing};
+use blindgrasp_firmware::control::{Control, HandBurst};
 use blindgrasp_firmware::joints::ls7366r::FilterClock;
 use blindgrasp_firmware::joints::{BoardJoints, JointsConfig, OutputConfig};
 use blindgrasp_firmware::model::{IMAGE_HAND, JOINTS, params};
 use blindgrasp_shared::command::{Command, Refusal};
-use blindgrasp_shared::device::{Device, Outputs};
+use blindgrasp_shared::device::{Device, Inputs, Outputs};
 use blindgrasp_shared::fault::{Fault, Raised};
 use blindgrasp_shared::identity::{Clock, Identity, Image};
 use blindgrasp_shared::link::message::{Packet, Reply, Request};
@@ -68,7 +68,7 @@ impl Bench {
     }
 
     fn turn(&mut self, packet: Option<Packet<JOINTS>>) -> Outputs<JOINTS> {
-        self.control.turn(&mut self.joints, packet, Timing::default(), 0, 0)
+        self.control.turn(&mut self.joints, &Inputs { packet, ..Inputs::default() })
     }
 
     fn turns(&mut self, count: usize) -> Outputs<JOINTS> {
@@ -177,8 +177,8 @@ fn the_amplifiers_have_power_only_while_there_may_be_torque() {
     expect(&mut bench, Request::Heartbeat, Mode::Disarmed);
     expect(&mut bench, Request::Command(Command::Arm), Mode::Armed);
     // The supply sags.
-    let sagged = Timing { supply_low: true, ..Timing::default() };
-    let outputs = bench.control.turn(&mut bench.joints, None, sagged, 0, 0);
+    let sagged = Inputs { supply_low: true, ..Inputs::default() };
+    let outputs = bench.control.turn(&mut bench.joints, &sagged);
     assert_eq!(outputs.record.fault, Some(Raised::of_hand(Fault::SupplyLow)));
     assert!(!bench.enable.high.get());
     assert_eq!(bench.clear(session).1, None);

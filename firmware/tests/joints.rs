@@ -3,9 +3,9 @@
 mod model;
 
 use blindgrasp_firmware::joints::ls7366r::{FilterClock, Zero};
-use blindgrasp_firmware::joints::{BoardJoints, ConfigError, Joints, JointsConfig, OutputConfig};
-use blindgrasp_shared::device::Reading;
+use blindgrasp_firmware::joints::{BoardJoints, ConfigError, JointsConfig, OutputConfig};
 use blindgrasp_shared::fault::{Fault, Raised};
+use blindgrasp_shared::joints::{Joints, Reading};
 use model::{CounterChip, DacChip, Line, Pin, PinEnd, Select, Traffic, share};
 use std::array;
 use std::cell::{RefCell, RefMut};
@@ -78,7 +78,7 @@ fn tested<const J: usize>(joint: usize, fault: Fault, counts: [i32; J]) -> Readi
 fn recover<const J: usize, const D: usize>(joints: &mut Hand<J, D>) -> [i32; J] {
     for _ in 0..100 {
         joints.recover();
-        if let Reading::Counts(counts) = joints.read() {
+        if let Reading::Counts(counts) = joints.collect() {
             return counts;
         }
         assert_eq!(joints.write(&[1.0; J], true), None);
@@ -93,11 +93,11 @@ fn a_hand_boots_counts_and_gives_torque() {
     assert_eq!(joints.failure(), None);
     assert_eq!(joints.zeros(), &[Zero::Lost; 12]);
     assert_eq!(board.volts(), [0.0; 12]);
-    assert_eq!(joints.read(), Reading::Counts([0; 12]));
+    assert_eq!(joints.collect(), Reading::Counts([0; 12]));
     for joint in 0..12 {
         board.counter(joint).turn(100 * joint as i32 - 500);
     }
-    assert_eq!(joints.read(), Reading::Counts(array::from_fn(|joint| 100 * joint as i32 - 500)));
+    assert_eq!(joints.collect(), Reading::Counts(array::from_fn(|joint| 100 * joint as i32 - 500)));
 
     let torques_nm = array::from_fn(|joint| 0.1 * joint as f32 - 0.5);
     assert_eq!(joints.write(&torques_nm, true), None);
@@ -119,7 +119,7 @@ fn outputs_are_off_before_anything_else() {
     let mut joints = board.boot();
     assert!(board.off());
     assert!(board.counter_traffic.borrow().frames > before.frames);
-    assert_eq!(joints.read(), failed(0, Fault::SampleMissing));
+    assert_eq!(joints.collect(), failed(0, Fault::SampleMissing));
 
     // Even with numbers that can't be.
     let mut board = Board::<4, 1>::powered_up();
@@ -154,7 +154,7 @@ fn a_reset_of_the_microcontroller_keeps_the_zeros_of_the_counters_that_counted_o
     let mut zeros = [Zero::Kept; 6];
     zeros[4] = Zero::Lost;
     assert_eq!(joints.zeros(), &zeros);
-    assert_eq!(joints.read(), Reading::Counts([1000, 1000, 1002, 1003, 0, 1005]));
+    assert_eq!(joints.collect(), Reading::Counts([1000, 1000, 1002, 1003, 0, 1005]));
 }
 
 #[test]
@@ -192,7 +192,7 @@ fn a_counter_that_does_not_answer_is_named() {
             board.counter(joint).line = line;
             let mut joints = board.boot();
             for _ in 0..30 {
-                assert_eq!(joints.read(), failed(joint, Fault::SampleMissing), "{line:?}");
+                assert_eq!(joints.collect(), failed(joint, Fault::SampleMissing), "{line:?}");
                 assert_eq!(joints.write(&[1.0; 6], true), None);
                 joints.recover();
                 assert!(board.off());
@@ -200,10 +200,10 @@ fn a_counter_that_does_not_answer_is_named() {
 
             let board = Board::<6, 2>::powered_up();
             let mut joints = board.boot();
-            assert_eq!(joints.read(), Reading::Counts([0; 6]));
+            assert_eq!(joints.collect(), Reading::Counts([0; 6]));
             assert_eq!(joints.write(&[1.0; 6], true), None);
             board.counter(joint).line = line;
-            assert_eq!(joints.read(), failed(joint, Fault::SampleMissing), "{line:?}");
+            assert_eq!(joints.collect(), failed(joint, Fault::SampleMissing), "{line:?}");
             // Already before the tick.
             assert!(board.off());
             assert_eq!(joints.write(&[1.0; 6], true), None);
@@ -218,7 +218,7 @@ fn a_counter_that_lost_its_power_is_named_in_that_tick() {
         let board = Board::<6, 2>::powered_up();
         let mut joints = board.boot();
         board.counter(joint).lose_power();
-        assert_eq!(joints.read(), failed(joint, Fault::CounterReset));
+        assert_eq!(joints.collect(), failed(joint, Fault::CounterReset));
     }
 }
 
@@ -230,7 +230,7 @@ fn a_setting_that_changed_is_named_within_a_tick_for_each_joint() {
             let board = Board::<6, 2>::powered_up();
             let mut joints = board.boot();
             spoil(&mut board.counter(joint));
-            let ticks = (1..=6).find(|_| joints.read() == failed(joint, Fault::CounterReset));
+            let ticks = (1..=6).find(|_| joints.collect() == failed(joint, Fault::CounterReset));
             // The reading at boot was the first joint's turn.
             assert_eq!(ticks, Some((joint + 5) % 6 + 1));
         }
@@ -267,7 +267,7 @@ fn a_dac_that_does_not_answer_is_named() {
             let raised = joints.failure().expect("a failure").raised();
             assert_eq!(raised.fault, Fault::OutputFailed, "{line:?}");
             assert_eq!(raised, Raised::at(4 * k, Fault::OutputFailed));
-            assert_eq!(joints.read(), failed(4 * k, Fault::OutputFailed));
+            assert_eq!(joints.collect(), failed(4 * k, Fault::OutputFailed));
             assert!(board.off());
 
             let board = Board::<12, 3>::powered_up();
@@ -280,7 +280,7 @@ fn a_dac_that_does_not_answer_is_named() {
             for other in (0..3).filter(|&other| other != k) {
                 assert_eq!(board.dac(other).power & 0b1111, 0);
             }
-            assert_eq!(joints.read(), failed(4 * k, Fault::OutputFailed));
+            assert_eq!(joints.collect(), failed(4 * k, Fault::OutputFailed));
         }
     }
 }
@@ -309,7 +309,7 @@ fn switching_off_is_repeated() {
     assert_eq!(joints.write(&[1.0; 6], true), None);
     board.counter(0).line = Line::Cut(0xFF);
     board.dac(1).line = Line::Error;
-    assert_eq!(joints.read(), failed(0, Fault::SampleMissing));
+    assert_eq!(joints.collect(), failed(0, Fault::SampleMissing));
     assert!(board.dac(1).power & 0b1111 != 0 && !board.enable.high.get());
     board.dac(1).line = Line::Whole;
     assert_eq!(joints.write(&[1.0; 6], true), None);
@@ -322,15 +322,15 @@ fn amplifiers_have_power_only_where_it_is_wanted_and_all_is_well() {
     let mut joints = board.boot();
     assert!(!board.enable.high.get());
     for powered in [false, true, false, true] {
-        joints.read();
+        joints.collect();
         assert_eq!(joints.write(&[0.0; 6], powered), None);
         assert_eq!(board.enable.high.get(), powered);
     }
     board.counter(5).lose_power();
-    joints.read();
+    joints.collect();
     assert!(!board.enable.high.get());
     for _ in 0..30 {
-        joints.read();
+        joints.collect();
         joints.write(&[1.0; 6], true);
         assert!(!board.enable.high.get());
     }
@@ -402,24 +402,24 @@ fn recovery_needs_the_cable_and_the_command() {
     }
     board.counter(3).line = Line::Cut(0xFF);
     board.counter(8).line = Line::Cut(0xFF);
-    assert_eq!(joints.read(), failed(3, Fault::SampleMissing));
+    assert_eq!(joints.collect(), failed(3, Fault::SampleMissing));
     // The first cable: after a turn of the self-test, the second one is named.
     board.counter(3).line = Line::Whole;
     for _ in 0..27 {
-        joints.read();
+        joints.collect();
     }
-    assert_eq!(joints.read(), failed(8, Fault::SampleMissing));
+    assert_eq!(joints.collect(), failed(8, Fault::SampleMissing));
     joints.recover();
-    assert_eq!(joints.read(), failed(8, Fault::SampleMissing));
+    assert_eq!(joints.collect(), failed(8, Fault::SampleMissing));
     board.counter(8).line = Line::Whole;
     // The two readings above were steps of this turn.
     for _ in 2..27 {
-        assert_eq!(joints.read(), failed(8, Fault::SampleMissing));
+        assert_eq!(joints.collect(), failed(8, Fault::SampleMissing));
     }
     // All is well, but nobody has said so.
     for _ in 0..100 {
         let counts = array::from_fn(|joint| 7 + joint as i32);
-        assert_eq!(joints.read(), tested(8, Fault::SampleMissing, counts));
+        assert_eq!(joints.collect(), tested(8, Fault::SampleMissing, counts));
         assert_eq!(joints.write(&[1.0; 12], true), None);
         assert!(board.off());
     }
@@ -427,7 +427,7 @@ fn recovery_needs_the_cable_and_the_command() {
     joints.recover();
     let mut counts = array::from_fn(|joint| 7 + joint as i32);
     counts[0] += 1000;
-    assert_eq!(joints.read(), Reading::Counts(counts));
+    assert_eq!(joints.collect(), Reading::Counts(counts));
     assert_eq!(joints.zeros(), &[Zero::Kept; 12]);
     assert_eq!(board.volts(), [0.0; 12]);
     assert_eq!(joints.write(&[1.0; 12], true), None);
@@ -443,15 +443,15 @@ fn after_lost_power_the_command_sets_the_zero() {
         board.counter(joint).turn(500);
     }
     board.counter(2).lose_power();
-    assert_eq!(joints.read(), failed(2, Fault::CounterReset));
+    assert_eq!(joints.collect(), failed(2, Fault::CounterReset));
     for _ in 0..14 {
-        assert_eq!(joints.read(), failed(2, Fault::CounterReset));
+        assert_eq!(joints.collect(), failed(2, Fault::CounterReset));
     }
     board.counter(2).turn(33);
-    assert_eq!(joints.read(), tested(2, Fault::CounterReset, [500, 500, 0, 500, 500, 500]));
+    assert_eq!(joints.collect(), tested(2, Fault::CounterReset, [500, 500, 0, 500, 500, 500]));
     joints.recover();
     board.counter(2).turn(4);
-    assert_eq!(joints.read(), Reading::Counts([500, 500, 4, 500, 500, 500]));
+    assert_eq!(joints.collect(), Reading::Counts([500, 500, 4, 500, 500, 500]));
     assert_eq!(joints.zeros()[2], Zero::Lost);
 }
 
@@ -461,7 +461,7 @@ fn what_breaks_between_test_and_command_is_found() {
     let mut joints = board.boot();
     board.counter(1).lose_power();
     for _ in 0..30 {
-        joints.read();
+        joints.collect();
     }
     board.counter(1).line = Line::Cut(0x00);
     // It is found by the next reading, whether the command comes before or not.
@@ -469,11 +469,11 @@ fn what_breaks_between_test_and_command_is_found() {
         if commanded {
             joints.recover();
         }
-        assert_eq!(joints.read(), failed(1, Fault::SampleMissing));
+        assert_eq!(joints.collect(), failed(1, Fault::SampleMissing));
     }
     board.counter(1).line = Line::Whole;
     for _ in 0..30 {
-        joints.read();
+        joints.collect();
     }
     board.dac(1).line = Line::Cut(0xFF);
     joints.recover();
@@ -490,7 +490,7 @@ fn every_failure_can_be_recovered_from() {
         board.counter(5).line = line;
         board.dac(0).line = line;
         for _ in 0..10 {
-            joints.read();
+            joints.collect();
             joints.write(&[1.0; 6], true);
             joints.recover();
         }
@@ -522,7 +522,7 @@ fn the_buses_are_busy_for_a_stated_time() {
     assert!(us(boot) < 4000.0);
 
     let running = measure(&mut || {
-        joints.read();
+        joints.collect();
         joints.write(&[1.0; 12], true);
     });
     println!("tick {running:?}: {:.0} us", us(running));
@@ -536,7 +536,7 @@ fn the_buses_are_busy_for_a_stated_time() {
     let mut longest = 0.0_f64;
     for _ in 0..60 {
         let tick = measure(&mut || {
-            joints.read();
+            joints.collect();
             joints.write(&[1.0; 12], true);
         });
         longest = longest.max(us(tick));

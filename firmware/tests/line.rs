@@ -12,15 +12,15 @@
 //! The hand is the one that the firmware is built for: 12 joints, and 16 with
 //! `HAND=models/hands/allegro-like.toml cargo test --release -p blindgrasp-firmware --test line -- --show-output`.
 
-use blindgrasp_firmware::control::{Control, HandBurst, Timing};
-use blindgrasp_firmware::joints::Joints;
+use blindgrasp_firmware::control::{Control, HandBurst};
 use blindgrasp_firmware::link::{Link, Port, SentBytes};
 use blindgrasp_firmware::model::{IMAGE_HAND, JOINTS, params};
 use blindgrasp_firmware::queue::{HandReply, Queues, Telemetry};
 use blindgrasp_shared::command::{Command, Grasp};
-use blindgrasp_shared::device::{Device, Reading, WAITING_MOST};
+use blindgrasp_shared::device::{Device, Inputs, WAITING_MOST};
 use blindgrasp_shared::fault::Raised;
 use blindgrasp_shared::identity::{Clock, Identity, Image};
+use blindgrasp_shared::joints::{Joints, Reading};
 use blindgrasp_shared::link::Receiver;
 use blindgrasp_shared::link::message::{Form, Packet, Reply, Request, Signals};
 use blindgrasp_shared::link::ring::Transfers;
@@ -188,7 +188,7 @@ struct Swinging {
 }
 
 impl Joints<JOINTS> for Swinging {
-    fn read(&mut self) -> Reading<JOINTS> {
+    fn collect(&mut self) -> Reading<JOINTS> {
         self.tick += 1;
         let params = params();
         let encoders = params.config().estimator.encoders;
@@ -239,7 +239,7 @@ fn run(way: Way, baud: f64, ticks: u32, load: Load) -> Outcome {
     let device = Device::new(params(), Identity::of(image, Clock::External));
     let mut control = Control::new(device, Box::leak(Box::new(HandBurst::new())));
     let mut queues = Queues::new();
-    let (mut control_end, link_end) = queues.split();
+    let (mut control_end, link_end, _) = queues.split();
     let mut link = Link::new(End(&wire), link_end);
     let mut joints = Swinging { tick: 0 };
     let instructions = counted("tick") * JOINTS as u64 / COUNTED_JOINTS;
@@ -258,13 +258,8 @@ fn run(way: Way, baud: f64, ticks: u32, load: Load) -> Outcome {
             _ => None,
         };
         let packet = request.map(|request| Packet { session, sequence: tick as u16, request });
-        let outputs = control.turn(
-            &mut joints,
-            packet,
-            Timing::default(),
-            control_end.dropped(),
-            control_end.waiting(),
-        );
+        let (dropped, waiting) = (control_end.dropped(), control_end.waiting());
+        let outputs = control.turn(&mut joints, &Inputs { packet, dropped, waiting, ..Inputs::default() });
         if let Some(reply) = outputs.reply {
             if let Reply::Identity { session: given, .. } = reply {
                 session = given;

@@ -9,6 +9,7 @@ use blindgrasp_shared::control::{Chosen, Hold, Latch, LawsConfig, Stance};
 use blindgrasp_shared::estimate::{Encoder, EstimatorConfig};
 use blindgrasp_shared::fault::FaultConfig;
 use blindgrasp_shared::hand::{Hand, Posture as PostureOf};
+use blindgrasp_shared::joints::MotorConfig;
 use blindgrasp_shared::limit::LimitConfig;
 use blindgrasp_shared::link::encode;
 use blindgrasp_shared::link::message::{Form, Reply, Signals};
@@ -71,6 +72,7 @@ fn controller(criterion: &mut Criterion) {
     let config = Config {
         period_us: 1000,
         estimator: EstimatorConfig { bandwidth_hz: 50.0, encoders: [encoder; J] },
+        motors: MotorConfig::FORWARD,
         laws: config,
         limits: LimitConfig {
             torque_nm: Some([1.3878; J]),

@@ -3,9 +3,10 @@
 use crate::MAX_JOINTS;
 use blindgrasp_shared::command::Refusal;
 use blindgrasp_shared::control::{GAIN_COUNT, Signal};
-use blindgrasp_shared::identity::{BrownOut, Clock, Crash, Identity, ResetCause};
+use blindgrasp_shared::estimate::Encoder;
+use blindgrasp_shared::identity::{BrownOut, Clock, Crash, Identity, ResetCause, Restored};
 use blindgrasp_shared::link::message;
-use blindgrasp_shared::parameters::Setting;
+use blindgrasp_shared::parameters::{Parameter, Setting};
 use blindgrasp_shared::signals::Value;
 use blindgrasp_shared::telemetry::{self, INTERFACE_VERSION};
 
@@ -41,11 +42,16 @@ pub struct Firmware {
     pub brown_out: BrownOut,
     /// Frequency of the clock that its cycles are counted in, Hz; 0 where nothing counts them.
     pub clock_hz: u32,
+    /// The parameters that differ from the hand's file.
+    pub changed: Vec<Parameter>,
+    /// What became at its start of the parameters that were saved.
+    pub restored: Restored,
 }
 
 impl From<&Identity<'_>> for Firmware {
     fn from(identity: &Identity<'_>) -> Self {
-        let &Identity { image, clock, reset, crash, brown_out, clock_hz, .. } = identity;
+        let &Identity { image, clock, reset, crash, brown_out, clock_hz, changed, restored, .. } = identity;
+        let is_changed = |parameter: &Parameter| changed & (1 << parameter.number()) != 0;
         Self {
             words: image.to_string(),
             kind: image.kind.to_owned(),
@@ -57,6 +63,8 @@ impl From<&Identity<'_>> for Firmware {
             crash,
             brown_out,
             clock_hz,
+            changed: Parameter::ALL.into_iter().filter(is_changed).collect(),
+            restored,
         }
     }
 }
@@ -95,6 +103,17 @@ pub struct Turned {
     pub record: Record,
 }
 
+/// Takes the value of a parameter among the encoders of a hand, if it is a sign or a zero of theirs.
+pub fn take_encoder(encoders: &mut [Encoder], parameter: Parameter, index: u8, value: f32) {
+    if let Some(encoder) = encoders.get_mut(usize::from(index)) {
+        match parameter {
+            Parameter::ENCODER_REVERSED => encoder.reversed = value != 0.0,
+            Parameter::ENCODER_ZERO => encoder.zero_count = value as i32,
+            _ => {}
+        }
+    }
+}
+
 /// The interface version of a firmware whose introduction can't be read: that is what every version begins with.
 pub(crate) fn other_interface(payload: &[u8]) -> Option<u16> {
     let (identity, _, _, theirs) = postcard::take_from_bytes::<(u8, u16, u16, u16)>(payload).ok()?.0;
@@ -115,6 +134,10 @@ pub(crate) fn in_words(packet: Option<&Packet>) -> String {
         Request::Joints(_) => "the joints of a tick".to_owned(),
         Request::Goodbye => "goodbye".to_owned(),
         Request::Rate { baud } => format!("a line of {baud} baud"),
+        Request::Zero { .. } => "`zero`".to_owned(),
+        Request::Confirm => "`confirm`".to_owned(),
+        Request::Save => "`save`".to_owned(),
+        Request::Defaults => "`defaults`".to_owned(),
     }
 }
 

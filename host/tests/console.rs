@@ -1,22 +1,28 @@
 //! `blindgrasp console` and the talk behind it, against the device of `blindgrasp-shared`: in simulated time where the
 //! time matters, and as a command with a socket for its port.
 
+#[path = "../../shared/tests/flash/mod.rs"]
+mod flash;
+
 use blindgrasp::device::talk::{Event, PATIENCE, Talk, TalkError};
 use blindgrasp::scene::HandModel;
 use blindgrasp::wire::{Answer, Packet, Request};
 use blindgrasp::{MAX_FINGERS, MAX_JOINTS};
 use blindgrasp_shared::command::{Command, Refusal};
-use blindgrasp_shared::device::{Device, Inputs, Reading};
+use blindgrasp_shared::device::{Device, Inputs};
 use blindgrasp_shared::fault::{Fault, Raised};
 use blindgrasp_shared::identity::{Clock, Crash, CrashKind, Identity, Image, ResetCause};
+use blindgrasp_shared::joints::Reading;
 use blindgrasp_shared::link::message::Reply;
 use blindgrasp_shared::link::rate::{FIRST_BAUD, HandRate};
 use blindgrasp_shared::link::{Receiver, encode, most_bytes};
 use blindgrasp_shared::parameters::Parameter;
+use blindgrasp_shared::store::{Store, StoreError};
 use blindgrasp_shared::supervisor::Mode;
 use blindgrasp_shared::telemetry::INTERFACE_VERSION;
 use blindgrasp_shared::telemetry::burst::Burst;
 use blindgrasp_shared::tick::Params;
+use flash::Memory;
 use serde::Serialize;
 use std::collections::VecDeque;
 use std::time::{Duration, Instant};
@@ -31,14 +37,22 @@ struct Board {
     mode: Mode,
     fault: Option<Raised>,
     heartbeats: usize,
+    hand_hash: u32,
+    store: Option<Store<Memory>>,
+    stored: Option<Result<(), StoreError>>,
 }
 
 impl Board {
     fn new() -> Self {
-        Self::with_version(INTERFACE_VERSION)
+        Self::start(INTERFACE_VERSION, None)
     }
 
     fn with_version(interface_version: u16) -> Self {
+        Self::start(interface_version, None)
+    }
+
+    /// A start, with what was saved.
+    fn start(interface_version: u16, memory: Option<Memory>) -> Self {
         let hand = HandModel::load("three-finger").expect("the hand");
         let image = Image {
             interface_version,
@@ -66,8 +80,18 @@ impl Board {
             let angle_rad = [0.0, -0.45, 0.75, 0.75][k % 4];
             *count = (angle_rad / hand.config.estimator.encoders[k].rad_per_count) as i32;
         }
+        let mut params = Params::new(hand.hand.cast(), &hand.config).expect("parameters");
+        let mut store = memory.map(|memory| Store::open(memory).expect("it can be read"));
+        let restored = store.as_mut().map(|store| {
+            store.prepare().expect("there is power");
+            store.restore(hand.hash(), &mut params, |_| {})
+        });
+        let device = Device::new(params, identity);
         Self {
-            device: Device::new(Params::new(hand.hand.cast(), &hand.config).expect("parameters"), identity),
+            device: match restored {
+                Some(restored) => device.with_store(restored),
+                None => device,
+            },
             burst: Box::new(Burst::new()),
             receiver: Receiver::new(),
             waiting: VecDeque::new(),
@@ -75,6 +99,9 @@ impl Board {
             mode: Mode::Disarmed,
             fault: None,
             heartbeats: 0,
+            hand_hash: hand.hash(),
+            store,
+            stored: None,
         }
     }
 
@@ -91,11 +118,11 @@ impl Board {
     /// A tick; returns what it says.
     fn tick(&mut self) -> Vec<u8> {
         let packet = self.waiting.pop_front();
-        let reading = self.reading;
-        let outputs = self.device.tick(
-            &Inputs { reading, late: false, supply_low: false, cycles: 7, dropped: 0, waiting: 0, packet },
-            &mut self.burst,
-        );
+        let inputs = Inputs { cycles: 7, packet, stored: self.stored.take(), ..Inputs::default() };
+        let outputs = self.device.tick(&self.reading, &inputs, &mut self.burst);
+        if let (Some(order), Some(store)) = (&outputs.order, &mut self.store) {
+            self.stored = Some(store.obey(order, self.hand_hash));
+        }
         (self.mode, self.fault) = (outputs.record.mode, outputs.record.fault);
         let mut said = Vec::new();
         if let Some(reply) = outputs.reply {
@@ -554,9 +581,18 @@ mod command {
     }
 
     fn type_all(board: Board, script: &str) -> (Output, String, String) {
-        let (mut child, _folder) = start(|socket| drop(serve(board, socket, Duration::from_secs(60))));
+        let (output, said, errors, _) = type_to(board, script);
+        (output, said, errors)
+    }
+
+    /// The same, with the board as it is left.
+    fn type_to(board: Board, script: &str) -> (Output, String, String, Board) {
+        let (left, board_left) = mpsc::channel();
+        let (mut child, _folder) =
+            start(move |socket| drop(left.send(serve(board, socket, Duration::from_secs(60)))));
         child.stdin.take().expect("stdin").write_all(script.as_bytes()).expect("the script is taken");
-        ended(child)
+        let (output, said, errors) = ended(child);
+        (output, said, errors, board_left.recv().expect("the board"))
     }
 
     /// The same at a terminal.
@@ -605,6 +641,84 @@ mod command {
         );
         let row = said.lines().find(|line| line.starts_with("1     finger-1-flex-1 ")).expect("a row");
         assert!(row.contains(" -0.450 "), "{row}");
+    }
+
+    /// As in docs/bring-up.md: a sign and the zeros are set, looked at, confirmed and saved, and are there after a reset.
+    #[test]
+    fn signs_and_zeros_are_set_shown_confirmed_and_saved() {
+        let board = Board::start(INTERFACE_VERSION, Some(Memory::blank(4)));
+        let script = "set encoder_reversed 1 1\nstatus\nzero\narm\n";
+        let (output, said, _, mut board) = type_to(board, script);
+        assert_eq!(output.status.code(), Some(1), "{said}");
+        let count = board.device.params().get(Parameter::ENCODER_ZERO, 1).unwrap().value;
+        assert!(count != 0.0);
+        let lines = [
+            "encoder_reversed[1] = 1: done",
+            "1     finger-1-flex-1 ",
+            "zero: done",
+            "encoder_zero_count[0] = 0  (Count at joint angle zero, counts)",
+            &format!(
+                "encoder_zero_count[1] = {count}  (Count at joint angle zero, counts; 0 in the hand's file)"
+            ),
+            "arm: refused, signs or zeros were set: look at the angles, and confirm them, first",
+        ];
+        assert_lines(&said, &lines);
+        let row = said.lines().find(|line| line.starts_with("1     finger-1-flex-1 ")).expect("a row");
+        assert!(row.contains(" 0.450 "), "{row}");
+
+        // Another program, and the same board.
+        board.waiting.clear();
+        let (output, said, errors, board) = type_to(board, "status\nsave\n");
+        assert_eq!(output.status.code(), Some(1), "{said}{errors}");
+        assert_lines(
+            &said,
+            &[
+                "other than in the hand's file: encoder_reversed, encoder_zero_count; `differs` shows them",
+                "save: refused, signs or zeros were set",
+            ],
+        );
+        let row = said.lines().find(|line| line.starts_with("1     finger-1-flex-1 ")).expect("a row");
+        assert!(row.contains(" 0.000 ") || row.contains(" -0.000 "), "{row}");
+        let (output, said, errors, board) = type_to(board, "confirm\nsave\narm\ndisarm\n");
+        assert_eq!((output.status.code(), errors.as_str()), (Some(0), ""), "{said}");
+        assert_lines(&said, &["confirm: done", "save: done", "arm: done"]);
+
+        let memory = board.store.expect("it has one").into_flash();
+        let board = Board::start(INTERFACE_VERSION, Some(memory));
+        let (output, said, errors, board) = type_to(board, "differs\narm\ndisarm\ndefaults\ndiffers\narm\n");
+        assert_eq!(output.status.code(), Some(1), "{said}{errors}");
+        assert_lines(
+            &said,
+            &[
+                "other than in the hand's file: encoder_reversed, encoder_zero_count; ",
+                "encoder_reversed[1] = 1  (",
+                &format!("encoder_zero_count[1] = {count}  ("),
+                "10 differ from the hand's file",
+                "arm: done",
+                "disarm: done",
+                "defaults: done",
+                "every parameter is as in the hand's file",
+                "arm: refused, signs or zeros were set",
+            ],
+        );
+        let memory = board.store.expect("it has one").into_flash();
+        let board = Board::start(INTERFACE_VERSION, Some(memory));
+        let (_, said, errors, _) = type_to(board, "arm\n");
+        assert!(said.contains("arm: done") && !said.contains("other than"), "{said}{errors}");
+    }
+
+    /// Saved with one hand, started with another.
+    #[test]
+    fn what_was_saved_for_another_hand_is_told_not_to_be_in_force() {
+        let mut board = Board::start(INTERFACE_VERSION, Some(Memory::blank(4)));
+        board.hand_hash ^= 1;
+        let (output, said, errors, board) = type_to(board, "set force_n 1\nsave\n");
+        assert_eq!((output.status.code(), errors.as_str()), (Some(0), ""), "{said}");
+        let board = Board::start(INTERFACE_VERSION, board.store.map(Store::into_flash));
+        let (_, said, errors, _) = type_to(board, "status\n");
+        assert!(errors.contains("of 1 parameters that were saved 1 are not in force"), "{said}{errors}");
+        let (_, said, _, _) = type_to(Board::new(), "save\n");
+        assert_lines(&said, &["save: refused, this hand has nothing to save to"]);
     }
 
     #[test]

@@ -112,6 +112,12 @@ refusals! {
     BeyondFile         = "this is looser than the hand's file, and the line can only tighten: `get` shows what the file says";
     SessionTaken       = "another program has said hello to this hand since, which ended this session: only one may lead it";
     NoSuchRate         = "this hand's line does not have this rate";
+    Unconfirmed        = "signs or zeros were set: look at the angles, and confirm them, first";
+    NotRead            = "the joints can't be read: see the fault";
+    Saving             = "parameters are being saved: wait for the answer";
+    NoStore            = "this hand has nothing to save to: an emulator has no flash";
+    NoSpare            = "no room is left to save to: a reset of the board makes some";
+    NotSaved           = "the flash did not take it; what was saved before is valid";
 }
 
 impl fmt::Display for Refusal {

@@ -4,39 +4,24 @@
 //! A tick takes at most one request, so that its time is bounded. Requests that the law has nothing to do with are
 //! answered here; commands go into the tick, which answers them.
 
-use crate::command::{Command, Refusal};
+use crate::command::{self, Command, Refusal};
 use crate::event::{Event, Events};
 use crate::fault::Raised;
-use crate::identity::{Clock, Identity};
+use crate::identity::{Clock, Identity, Restored};
+use crate::joints::{Joints, Reading};
 use crate::link::message::{Form, Packet, Reply, Request, Signals};
 use crate::link::rate::FIRST_BAUD;
+use crate::saved::{Order, Saving};
+use crate::store::StoreError;
 use crate::supervisor::Mode;
 use crate::telemetry::burst::{Burst, Caught};
 use crate::telemetry::snapshot::{Outgoing, Part};
 use crate::telemetry::{INTERFACE_VERSION, Record};
 use crate::tick::{self, Input, Params, Sensed, State};
 
-/// What a tick gets from the joints.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Reading<const J: usize> {
-    /// Encoder counts.
-    Counts([i32; J]),
-    /// Joints that could not be read or driven.
-    Failed(Raised),
-    /// Joints that failed and have passed their self-test since. A fault that is cleared brings them back.
-    Tested {
-        /// Why they failed.
-        raised: Raised,
-        /// Encoder counts that they would begin with now.
-        counts: [i32; J],
-    },
-}
-
-/// What a tick gets.
-#[derive(Clone, Debug, PartialEq)]
+/// The inputs of a tick besides the joints.
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Inputs<const J: usize> {
-    /// The joints.
-    pub reading: Reading<J>,
     /// Whether the tick before missed its deadline.
     pub late: bool,
     /// Whether the supply was too low at some time since the tick before.
@@ -49,12 +34,16 @@ pub struct Inputs<const J: usize> {
     pub waiting: usize,
     /// A request.
     pub packet: Option<Packet<J>>,
+    /// Whether there is no room for an answer; then there is no request either.
+    pub no_room: bool,
+    /// What became of the order that a tick before has given to the store.
+    pub stored: Option<Result<(), StoreError>>,
 }
 
 /// What a tick gives.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Outputs<const J: usize> {
-    /// Torques of the next tick, N m.
+    /// Torques of the motors in the next tick, N m.
     pub torques_nm: [f32; J],
     /// Whether the amplifiers have power in it.
     pub powered: bool,
@@ -68,6 +57,8 @@ pub struct Outputs<const J: usize> {
     pub baud: Option<u32>,
     /// A part of a snapshot that is to be sent.
     pub part: Option<Part>,
+    /// What the store is to do; there is no other until [`Inputs::stored`] says what became of it.
+    pub order: Option<Order>,
 }
 
 /// A hand's controller with its link.
@@ -81,6 +72,15 @@ pub struct Device<const J: usize, const F: usize> {
     snapshot: Outgoing<J>,
     /// Rates that its line has besides the first.
     faster_bauds: &'static [u32],
+    /// Whether there is something to save to.
+    has_store: bool,
+    saving: Option<Save>,
+    /// The answer to a save that is over, until a tick has no other.
+    saved: Option<Reply<'static, J>>,
+    /// Whether what is read with the signs and zeros that were set is known to be right.
+    is_confirmed: bool,
+    /// What went wrong when the joints were last written.
+    failed: Option<Raised>,
 }
 
 impl<const J: usize, const F: usize> Device<J, F> {
@@ -94,6 +94,11 @@ impl<const J: usize, const F: usize> Device<J, F> {
             telemetry: Telemetry::OFF,
             snapshot: Outgoing::new(),
             faster_bauds: &[],
+            has_store: false,
+            saving: None,
+            saved: None,
+            is_confirmed: true,
+            failed: None,
         }
     }
 
@@ -101,6 +106,12 @@ impl<const J: usize, const F: usize> Device<J, F> {
     #[must_use]
     pub fn with_faster_bauds(self, faster_bauds: &'static [u32]) -> Self {
         Self { faster_bauds, ..self }
+    }
+
+    /// The same with something to save parameters to, from which its own come, as was found at the start.
+    #[must_use]
+    pub fn with_store(self, restored: Restored) -> Self {
+        Self { has_store: true, identity: Identity { restored, ..self.identity }, ..self }
     }
 
     /// The parameters.
@@ -113,21 +124,46 @@ impl<const J: usize, const F: usize> Device<J, F> {
         &self.state
     }
 
+    /// One tick, with the joints read before and written after it. Torques that could not be written are a failed reading in
+    /// the next. Joints that failed work again when the tick has taken the user's command to clear the fault, and not
+    /// before.
+    pub fn turn(
+        &mut self,
+        joints: &mut impl Joints<J>,
+        inputs: &Inputs<J>,
+        burst: &mut Burst<J>,
+    ) -> Outputs<J> {
+        let read = joints.collect();
+        let reading = self.failed.take().map_or(read, Reading::Failed);
+        let outputs = self.tick(&reading, inputs, burst);
+        if outputs.record.answer == Some(CLEARED) {
+            joints.recover();
+        }
+        self.failed = joints.write(&outputs.torques_nm, outputs.powered);
+        outputs
+    }
+
     /// One tick, with its request. Its record goes into the burst, too.
-    pub fn tick(&mut self, inputs: &Inputs<J>, burst: &mut Burst<J>) -> Outputs<J> {
+    pub fn tick(&mut self, reading: &Reading<J>, inputs: &Inputs<J>, burst: &mut Burst<J>) -> Outputs<J> {
         self.session.quiet_ticks = self.session.quiet_ticks.saturating_add(1);
         let asked = match &inputs.packet {
-            Some(packet) => self.ask(packet, burst),
+            Some(packet) => self.ask(packet, reading, burst),
             None => Asked::Nothing,
         };
+        let order = self.save(inputs.stored);
         let heartbeat = matches!(asked, Asked::Heartbeat { .. });
         let command = match asked {
             Asked::Command { command, .. } => Some(command),
             _ => None,
         };
+        let motion;
         let input = Input {
-            sensed: match &inputs.reading {
+            sensed: match reading {
                 Reading::Counts(counts) => Sensed::Counts(counts),
+                Reading::Motion { angles_rad, speeds_rad_s } => {
+                    motion = self.params.config().estimator.motion(angles_rad, speeds_rad_s);
+                    Sensed::Ideal { angles_rad: &motion.0, speeds_rad_s: &motion.1 }
+                }
                 Reading::Failed(raised) => Sensed::Failed(*raised),
                 Reading::Tested { raised, counts } => Sensed::Tested { raised: *raised, counts },
             },
@@ -135,7 +171,8 @@ impl<const J: usize, const F: usize> Device<J, F> {
                 .with(Event::Heartbeat, heartbeat)
                 .with(Event::Late, inputs.late)
                 .with(Event::SupplyLow, inputs.supply_low)
-                .with(Event::FallbackClock, self.identity.clock == Clock::Fallback),
+                .with(Event::FallbackClock, self.identity.clock == Clock::Fallback)
+                .with(Event::Unconfirmed, !self.is_confirmed),
             command,
         };
         let mut output = tick::tick(&self.params, &mut self.state, &input);
@@ -154,7 +191,8 @@ impl<const J: usize, const F: usize> Device<J, F> {
             _ => None,
         };
         let reply = match asked {
-            Asked::Nothing => None,
+            Asked::Nothing if inputs.no_room => None,
+            Asked::Nothing => self.saved.take(),
             Asked::Answered(reply) => Some(reply),
             Asked::Heartbeat { sequence } | Asked::Rate { sequence, .. } => {
                 Some(Reply::Answer { sequence, refused: None })
@@ -164,8 +202,74 @@ impl<const J: usize, const F: usize> Device<J, F> {
                 Some(Reply::Answer { sequence, refused })
             }
         };
-        let tick::Output { torques_nm, powered, record } = output;
-        Outputs { torques_nm, powered, record, telemetry, reply, baud, part }
+        let tick::Output { mut torques_nm, powered, record } = output;
+        self.params.config().motors.turn(&mut torques_nm);
+        Outputs { torques_nm, powered, record, telemetry, reply, baud, part, order }
+    }
+
+    /// Goes on with a save, if there is one, once the store has done what it was told before.
+    fn save(&mut self, stored: Option<Result<(), StoreError>>) -> Option<Order> {
+        let save = self.saving.as_mut()?;
+        if save.is_waiting {
+            let done = stored?;
+            save.is_waiting = false;
+            if done.is_err() || save.saving.is_over() {
+                self.end_save(done);
+                return None;
+            }
+        }
+        let order = save.saving.next(&self.params);
+        save.is_waiting = order.is_some();
+        order
+    }
+
+    /// Ends a save, and leaves its answer.
+    fn end_save(&mut self, done: Result<(), StoreError>) {
+        let Some(Save { sequence, session, forgets, .. }) = self.saving.take() else { return };
+        let refused = done.err().map(|error| match error {
+            StoreError::NoSpare => Refusal::NoSpare,
+            _ => Refusal::NotSaved,
+        });
+        if forgets && refused.is_none() {
+            self.is_confirmed &= !self.params.reading_differs();
+            self.params.reset();
+        }
+        // Who asked may be gone.
+        if session == self.session.number {
+            self.saved = Some(Reply::Answer { sequence, refused });
+        }
+    }
+
+    /// Begins a save, or says why not.
+    fn begin_save(&mut self, sequence: u16, forgets: bool) -> Option<Refusal> {
+        if !self.has_store {
+            return Some(Refusal::NoStore);
+        }
+        if self.state.mode() != Mode::Disarmed {
+            return Some(Refusal::NotDisarmed);
+        }
+        // What is forgotten need not be right.
+        if !(forgets || self.is_confirmed) {
+            return Some(Refusal::Unconfirmed);
+        }
+        let saving = if forgets { Saving::NOTHING } else { Saving::DIFFERENCES };
+        self.saving =
+            Some(Save { sequence, session: self.session.number, forgets, saving, is_waiting: false });
+        None
+    }
+
+    /// Changes the configuration while the hand is disarmed, or says why not.
+    fn configure(
+        &mut self,
+        is_reading: bool,
+        change: impl FnOnce(&mut Params<J, F>) -> Result<(), Refusal>,
+    ) -> Option<Refusal> {
+        if self.state.mode() != Mode::Disarmed {
+            return Some(Refusal::NotDisarmed);
+        }
+        let refused = change(&mut self.params).err();
+        self.is_confirmed &= refused.is_some() || !is_reading;
+        refused
     }
 
     /// Saves the state where it is due, and the part of it that is to be sent now.
@@ -181,7 +285,7 @@ impl<const J: usize, const F: usize> Device<J, F> {
     }
 
     /// What becomes of a request before the tick.
-    fn ask(&mut self, packet: &Packet<J>, burst: &Burst<J>) -> Asked<J> {
+    fn ask(&mut self, packet: &Packet<J>, reading: &Reading<J>, burst: &Burst<J>) -> Asked<J> {
         let sequence = packet.sequence;
         let answer = |refused| Asked::Answered(Reply::Answer { sequence, refused });
         match packet.request {
@@ -200,14 +304,29 @@ impl<const J: usize, const F: usize> Device<J, F> {
         if let Some(refusal) = self.session.refuse(packet.session, sequence) {
             return answer(Some(refusal));
         }
+        if self.saving.is_some() && packet.request.is_to_wait_for_a_save() {
+            return answer(Some(Refusal::Saving));
+        }
         match packet.request {
             Request::Command(command) => Asked::Command { sequence, command },
             Request::Heartbeat => Asked::Heartbeat { sequence },
             Request::SetParameter { parameter, index, value } => {
-                if self.state.mode() != Mode::Disarmed {
-                    return answer(Some(Refusal::NotDisarmed));
+                let set = |params: &mut Params<J, F>| params.set(parameter, index, value);
+                answer(self.configure(parameter.is_reading(), set))
+            }
+            Request::Zero { joint } => match self.params.config().estimator.counts(reading) {
+                Some(counts) => answer(self.configure(true, |params| params.set_zero(joint, &counts))),
+                None => answer(Some(Refusal::NotRead)),
+            },
+            Request::Confirm => {
+                self.is_confirmed = true;
+                answer(None)
+            }
+            Request::Save | Request::Defaults => {
+                match self.begin_save(sequence, packet.request == Request::Defaults) {
+                    Some(refusal) => answer(Some(refusal)),
+                    None => Asked::Nothing,
                 }
-                answer(self.params.set(parameter, index, value).err())
             }
             Request::GetParameter { parameter, index } => match self.params.get(parameter, index) {
                 Ok(setting) => Asked::Answered(Reply::Value { sequence, parameter, index, setting }),
@@ -255,6 +374,22 @@ enum Asked<const J: usize> {
     Rate { sequence: u16, baud: u32 },
     Command { sequence: u16, command: Command },
 }
+
+/// A save under way.
+#[derive(Clone, Copy, Debug)]
+struct Save {
+    /// Number of the request, and of its session.
+    sequence: u16,
+    session: u16,
+    /// Whether the hand's file is to hold once it is over.
+    forgets: bool,
+    saving: Saving,
+    /// Whether the store has not yet done what it was told.
+    is_waiting: bool,
+}
+
+/// A fault that was cleared.
+const CLEARED: command::Answer = command::Answer { command: Command::ClearFault, refused: None };
 
 /// Ticks without a request after which nobody is thought to use a session.
 const IN_USE_TICKS: u32 = 250;

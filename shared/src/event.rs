@@ -15,11 +15,14 @@ pub enum Event {
     FallbackClock = 1 << 2,
     /// The supply was below what its monitor is set to, at some time since the tick before.
     SupplyLow = 1 << 3,
+    /// Signs or zeros of the joints were set since somebody confirmed what is read with them.
+    Unconfirmed = 1 << 4,
 }
 
 impl Event {
     /// Every event.
-    pub const ALL: [Self; 4] = [Self::Heartbeat, Self::Late, Self::FallbackClock, Self::SupplyLow];
+    pub const ALL: [Self; 5] =
+        [Self::Heartbeat, Self::Late, Self::FallbackClock, Self::SupplyLow, Self::Unconfirmed];
 
     /// Its name in recordings and tables.
     pub const fn key(self) -> &'static str {
@@ -28,6 +31,7 @@ impl Event {
             Self::Late => "late",
             Self::FallbackClock => "fallback_clock",
             Self::SupplyLow => "supply_low",
+            Self::Unconfirmed => "unconfirmed",
         }
     }
 
@@ -38,6 +42,7 @@ impl Event {
             Self::Late => "late",
             Self::FallbackClock => "fall-back clock",
             Self::SupplyLow => "supply low",
+            Self::Unconfirmed => "reading unconfirmed",
         }
     }
 }

@@ -98,6 +98,8 @@ pub struct Identity<'a> {
     /// The parameters that differ from the hand's file: a bit for each, by its
     /// [number](crate::parameters::Parameter::number).
     pub changed: u64,
+    /// What became at the start of the parameters that were saved.
+    pub restored: Restored,
 }
 
 impl<'a> Identity<'a> {
@@ -113,8 +115,19 @@ impl<'a> Identity<'a> {
             clock_hz: 0,
             most_baud: 0,
             changed: 0,
+            restored: Restored { saved: 0, ignored: 0 },
         }
     }
+}
+
+/// What became of the saved parameters at the start.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Restored {
+    /// Parameters that were saved.
+    pub saved: u16,
+    /// Those of them that are not in effect: of another hand, unknown to this firmware, or beyond what its hand's file
+    /// allows.
+    pub ignored: u16,
 }
 
 /// What gives a microcontroller its time.

@@ -22,6 +22,7 @@ pub mod event;
 pub mod fault;
 pub mod hand;
 pub mod identity;
+pub mod joints;
 pub mod ledger;
 pub mod limit;
 pub mod link;

@@ -1,18 +1,18 @@
 //! A hand and its configuration as bytes: what a firmware is built with.
 //!
 //! ```text
-//! postcard of (outputs, hand, encoders, tick period, every parameter in the order of its number and its index) | CRC-32
+//! postcard of (outputs, hand, angle of a count of each encoder, tick period, every parameter in the order of its number and its index) | CRC-32
 //! ```
 //!
 //! A parameter that is switched off is not a number. The bytes do not depend on the capacity that the hand is held in, and
 //! keep every bit of every number. Their CRC is the hand's hash: equal hands have equal firmware.
 
-use crate::array::Item;
 use crate::bytes::BufferTooSmall;
 use crate::control::{Chosen, Hold, LawsConfig, PerGain};
 use crate::estimate::{Encoder, EstimatorConfig};
 use crate::fault::FaultConfig;
 use crate::hand::Hand;
+use crate::joints::MotorConfig;
 use crate::limit::LimitConfig;
 use crate::link::checksum::Checksum;
 use crate::list::List;
@@ -51,8 +51,7 @@ impl core::error::Error for ModelError {}
 /// What stands between the hand and the parameters.
 #[derive(Serialize, Deserialize)]
 struct Head<const J: usize> {
-    #[serde(with = "crate::array")]
-    encoders: [Encoder; J],
+    rad_per_count: List<f32, J>,
     period_us: u32,
 }
 
@@ -68,9 +67,9 @@ pub fn encode<'b, const J: usize, const F: usize>(
     buffer: &'b mut [u8],
 ) -> Result<&'b [u8], BufferTooSmall> {
     let joint_count = hand.joint_count();
-    let mut encoders = config.estimator.encoders;
-    encoders.iter_mut().skip(joint_count).for_each(|encoder| *encoder = Encoder::filler());
-    let head = Head { encoders, period_us: config.period_us };
+    let rad_per_count = config.estimator.encoders.map(|encoder| encoder.rad_per_count);
+    let head =
+        Head { rad_per_count: List::first_of(rad_per_count, joint_count), period_us: config.period_us };
     let mut length =
         postcard::to_slice(&(torques_per_volt_nm_v, hand, head), buffer).map_err(|_| BufferTooSmall)?.len();
     for (parameter, index) in places(joint_count) {
@@ -138,7 +137,7 @@ fn read_hand<const J: usize, const F: usize>(reader: &mut Reader<'_>) -> Result<
 #[inline(never)]
 fn read_config<const J: usize>(reader: &mut Reader<'_>, joint_count: usize) -> Result<Config<J>, ModelError> {
     let head = Head::deserialize(&mut *reader).map_err(|_| ModelError::Malformed)?;
-    let mut config = least(head.period_us, head.encoders);
+    let mut config = least(&head);
     for (parameter, index) in places(joint_count) {
         let value = f32::deserialize(&mut *reader).map_err(|_| ModelError::Malformed)?;
         let value = (!value.is_nan()).then_some(value);
@@ -148,10 +147,15 @@ fn read_config<const J: usize>(reader: &mut Reader<'_>, joint_count: usize) -> R
 }
 
 /// Returns a configuration of nothing but zeros and what is switched off.
-fn least<const J: usize>(period_us: u32, encoders: [Encoder; J]) -> Config<J> {
+fn least<const J: usize>(head: &Head<J>) -> Config<J> {
+    let mut encoders = [Encoder::default(); J];
+    for (encoder, rad_per_count) in encoders.iter_mut().zip(head.rad_per_count.iter()) {
+        encoder.rad_per_count = *rad_per_count;
+    }
     Config {
-        period_us,
+        period_us: head.period_us,
         estimator: EstimatorConfig { bandwidth_hz: 0.0, encoders },
+        motors: MotorConfig::FORWARD,
         laws: LawsConfig {
             gains: PerGain::all(0.0),
             chosen: Chosen::NONE,

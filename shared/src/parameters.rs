@@ -65,7 +65,7 @@ enum Place {
 /// Writes the rows, a constant for each, and where it is kept.
 macro_rules! parameters {
     ($($name:ident, $each:ident, $bound:ident, $key:literal, $unit:literal, $words:literal,
-        $group:ident.$($field:ident).+;)*) => {
+        $group:ident.$($field:ident).+ $([k].$part:ident)?;)*) => {
         /// The rows that are not of laws.
         #[allow(non_camel_case_types, clippy::upper_case_acronyms)]
         #[derive(Clone, Copy)]
@@ -85,7 +85,7 @@ macro_rules! parameters {
 
         /// Returns the value of a row.
         fn get<const J: usize>(config: &Config<J>, number: Number, k: usize) -> Option<f32> {
-            match number { $(Number::$name => config.$group.$($field).+.get(k),)* }
+            match number { $(Number::$name => config.$group.$($field).+ $(.get(k)?.$part)? .get(k),)* }
         }
 
         /// Sets the value of a row.
@@ -95,7 +95,10 @@ macro_rules! parameters {
             k: usize,
             value: Option<f32>,
         ) -> Result<(), Refusal> {
-            match number { $(Number::$name => config.$group.$($field).+.put(k, value),)* }
+            let none = Refusal::NoSuchParameter;
+            match number {
+                $(Number::$name => config.$group.$($field).+ $(.get_mut(k).ok_or(none)?.$part)? .put(k, value),)*
+            }
         }
     };
 }
@@ -123,6 +126,9 @@ parameters! {
     SOFT_START_TIME,  Hand,  AtLeast, "supervisor.soft_start_ms",      "ms",        "Time over which the force grows",                           supervisor.soft_start_ms;
     RELEASE_TIME,     Hand,  AtMost,  "supervisor.release_ms",         "ms",        "Time over which force and stiffness fall",                  supervisor.release_ms;
     AMPLIFIER_START_TIME, Hand, AtLeast, "supervisor.amplifier_start_ms", "ms",       "Time that the amplifiers take to start after they got power", supervisor.amplifier_start_ms;
+    ENCODER_REVERSED, Joint, Free,    "encoder_reversed",              "",          "1 where the count falls while the joint's angle rises, else 0", estimator.encoders[k].reversed;
+    ENCODER_ZERO,     Joint, Free,    "encoder_zero_count",            "counts",    "Count at joint angle zero",                                 estimator.encoders[k].zero_count;
+    MOTOR_REVERSED,   Joint, Free,    "motor_reversed",                "",          "1 where a positive voltage pushes the joint in its negative direction, else 0", motors.reversed;
 }
 
 /// Every row: those above, the gains, their limits, the laws.
@@ -250,6 +256,11 @@ impl Parameter {
         self.row().bound
     }
 
+    /// Whether what the joints' angles are read from hangs on it: their signs and zeros.
+    pub fn is_reading(self) -> bool {
+        matches!(self, Self::ENCODER_REVERSED | Self::ENCODER_ZERO)
+    }
+
     /// Whether it says how firmly to grasp, so that it may be asked for with each grasp.
     pub fn is_gain(self) -> bool {
         matches!(self.row().place, Place::Gain(_))
@@ -309,6 +320,47 @@ impl Field for u32 {
         }
         *self = whole;
         Ok(())
+    }
+}
+
+/// The largest number of which every smaller one is an `f32`.
+const MOST_WHOLE: f32 = 16_777_216.0;
+
+impl Field for i32 {
+    fn get(&self, _: usize) -> Option<f32> {
+        Some(*self as f32)
+    }
+
+    fn put(&mut self, _: usize, value: Option<f32>) -> Result<(), Refusal> {
+        let value = value.ok_or(Refusal::OutOfRange)?;
+        let whole = value as i32;
+        if whole as f32 != value || value.abs() > MOST_WHOLE {
+            return Err(Refusal::OutOfRange);
+        }
+        *self = whole;
+        Ok(())
+    }
+}
+
+impl Field for bool {
+    fn get(&self, _: usize) -> Option<f32> {
+        Some(if *self { 1.0 } else { 0.0 })
+    }
+
+    fn put(&mut self, _: usize, value: Option<f32>) -> Result<(), Refusal> {
+        let (Some(0.0) | Some(1.0)) = value else { return Err(Refusal::OutOfRange) };
+        *self = value == Some(1.0);
+        Ok(())
+    }
+}
+
+impl<const N: usize> Field for [bool; N] {
+    fn get(&self, k: usize) -> Option<f32> {
+        <[bool]>::get(self, k)?.get(0)
+    }
+
+    fn put(&mut self, k: usize, value: Option<f32>) -> Result<(), Refusal> {
+        <[bool]>::get_mut(self, k).ok_or(Refusal::NoSuchParameter)?.put(0, value)
     }
 }
 
@@ -408,8 +460,9 @@ impl<const J: usize> Config<J> {
             Place::Gain(k) => self.laws.gains.iter_mut().nth(k.into()).ok_or(none)?.put(0, value),
             Place::Limit(k) => self.limits.gains.iter_mut().nth(k.into()).ok_or(none)?.put(0, value),
             Place::Law(k) => {
-                let (Some(0.0) | Some(1.0)) = value else { return Err(Refusal::OutOfRange) };
-                self.laws.chosen = self.laws.chosen.with(k, value == Some(1.0));
+                let mut is_chosen = self.laws.chosen.has(k);
+                is_chosen.put(0, value)?;
+                self.laws.chosen = self.laws.chosen.with(k, is_chosen);
                 Ok(())
             }
         }
@@ -457,10 +510,49 @@ impl<const J: usize, const F: usize> Params<J, F> {
         }
         let mut config = *self.config();
         config.put(self.hand().joint_count(), parameter, index, Some(value))?;
-        self.configure(&config).map_err(|_| Refusal::OutOfRange)?;
+        self.change(&config, parameter)
+    }
+
+    /// Sets the zero of a joint, or of all, to the counts at which they stand.
+    ///
+    /// # Errors
+    /// There is no such joint, or a count is too large. Nothing changes then.
+    pub fn set_zero(&mut self, joint: Option<u8>, counts: &[i32; J]) -> Result<(), Refusal> {
+        let joint_count = self.hand().joint_count();
+        if joint.is_some_and(|joint| usize::from(joint) >= joint_count) {
+            return Err(Refusal::NoSuchParameter);
+        }
+        let mut config = *self.config();
+        let encoders = config.estimator.encoders.iter_mut().zip(counts).take(joint_count);
+        for (_, (encoder, count)) in
+            (0_u8..).zip(encoders).filter(|(k, _)| joint.is_none_or(|joint| joint == *k))
+        {
+            encoder.zero_count = *count;
+        }
+        self.change(&config, Parameter::ENCODER_ZERO)
+    }
+
+    /// Puts the configuration of the hand's file in force.
+    pub fn reset(&mut self) {
+        let file = *self.file();
+        // It was good at the start.
+        if self.configure(&file).is_ok() {
+            self.changed = 0;
+        }
+    }
+
+    /// Exchanges the configuration for one that differs by a parameter.
+    fn change(&mut self, config: &Config<J>, parameter: Parameter) -> Result<(), Refusal> {
+        self.configure(config).map_err(|_| Refusal::OutOfRange)?;
         let bit = 1 << parameter.number();
         self.changed = if self.differs(parameter) { self.changed | bit } else { self.changed & !bit };
         Ok(())
+    }
+
+    /// Whether signs or zeros are other than in the hand's file.
+    pub fn reading_differs(&self) -> bool {
+        let is_changed = |parameter: &Parameter| self.changed & (1 << parameter.number()) != 0;
+        Parameter::ALL.iter().filter(|parameter| parameter.is_reading()).any(is_changed)
     }
 
     /// Whether a parameter is other than in the hand's file, of any joint or axis.

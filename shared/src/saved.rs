@@ -1,14 +1,16 @@
 //! Parameters that outlive a reset: what is saved of them, and what comes of it at the next start.
 //!
 //! Saved is what differs from the hand's file, so that whatever was left alone follows the file. The store has other time
-//! than the tick: [`Saving`] looks at one parameter a tick, and hands the set over as [`Order`]s, at most one a tick.
-//!
-//! It is not yet called by the firmware.
+//! than the tick: [`Saving`] looks at a few parameters a tick, and hands the set over as [`Order`]s, one after the other.
 
+use crate::identity::Restored;
 use crate::parameters::{Parameter, Setting};
 use crate::store::{Entry, Store, StoreError, key_hash};
 use crate::tick::Params;
 use embedded_storage::nor_flash::NorFlash;
+
+/// Parameters that are looked at in a tick.
+const LOOKS: usize = 8;
 
 /// What the store is to do next.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -56,6 +58,11 @@ impl Saving {
 
     /// The order of this tick, if there is one.
     pub fn next<const J: usize, const F: usize>(&mut self, params: &Params<J, F>) -> Option<Order> {
+        (0..LOOKS).find_map(|_| self.look(params))
+    }
+
+    /// Looks at a parameter.
+    fn look<const J: usize, const F: usize>(&mut self, params: &Params<J, F>) -> Option<Order> {
         if self.is_over() {
             return None;
         }
@@ -83,28 +90,19 @@ impl Saving {
     }
 }
 
-/// What became of the saved parameters at the start.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Restored {
-    /// Parameters that were saved.
-    pub saved: usize,
-    /// Those of them that are not in effect: of another hand, unknown to this firmware, or beyond what its hand's file
-    /// allows.
-    pub ignored: usize,
-}
-
 /// How often all values are tried: a gain has to be within its limit, and either may have been saved first.
 const PASSES: usize = 2;
 
 impl<S: NorFlash> Store<S> {
-    /// Does what is ordered; tells when the set is saved, or why it is not. What is left of a set that failed is passed
-    /// over.
-    pub fn obey(&mut self, order: &Order, hand_hash: u32) -> Option<Result<(), StoreError>> {
+    /// Does what is ordered.
+    ///
+    /// # Errors
+    /// Nothing is saved, and what was saved before stays valid.
+    pub fn obey(&mut self, order: &Order, hand_hash: u32) -> Result<(), StoreError> {
         match order {
-            Order::Begin(entry_count) => self.begin(hand_hash, usize::from(*entry_count)).err().map(Err),
-            Order::Put(_) | Order::Finish if !self.is_writing() => None,
-            Order::Put(entry) => self.put(entry).err().map(Err),
-            Order::Finish => Some(self.finish()),
+            Order::Begin(entry_count) => self.begin(hand_hash, usize::from(*entry_count)),
+            Order::Put(entry) => self.put(entry),
+            Order::Finish => self.finish(),
         }
     }
 
@@ -125,7 +123,7 @@ impl<S: NorFlash> Store<S> {
                 let _ = params.set(parameter, entry.index, entry.value);
             }
         }
-        let mut restored = Restored { saved: set.entry_count, ignored: 0 };
+        let mut restored = Restored { saved: set.entry_count as u16, ignored: 0 };
         for index in 0..set.entry_count {
             let Ok(Some(entry)) = self.entry(index) else {
                 restored.ignored += 1;

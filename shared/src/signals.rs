@@ -550,7 +550,7 @@ mod tests {
         for refusal in Refusal::ALL {
             refusals.push(postcard::to_slice(refusal, &mut buffer).unwrap().to_vec());
         }
-        assert_eq!(bytes(refusals), "000102030405060708090a0b0c0d0e0f10111213141516171819");
+        assert_eq!(bytes(refusals), "000102030405060708090a0b0c0d0e0f101112131415161718191a1b1c1d1e1f");
         let mut faults = Vec::new();
         for fault in Fault::ALL {
             faults.push(postcard::to_slice(fault, &mut buffer).unwrap().to_vec());

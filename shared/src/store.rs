@@ -17,8 +17,6 @@
 //!
 //! An entry names its parameter by a hash of its key, not by its place on the wire: another firmware takes what it knows
 //! and can say what it left out.
-//!
-//! It is not yet called by the firmware.
 
 use crate::link::checksum::Checksum;
 use crate::parameter::Text;
@@ -226,11 +224,6 @@ impl<F: NorFlash> Store<F> {
         }
         self.sectors[which].free = begin + SLOT_BYTES;
         Ok(true)
-    }
-
-    /// Whether a set was begun that is neither finished nor given up.
-    pub fn is_writing(&self) -> bool {
-        self.writing.is_some()
     }
 
     /// Begins a set; one that is not finished is given up.

@@ -21,6 +21,7 @@ use crate::estimate::{Estimator, EstimatorConfig, Motion};
 use crate::event::{Event, Events};
 use crate::fault::{Driven, Fault, FaultConfig, Raised, Watch};
 use crate::hand::Hand;
+use crate::joints::MotorConfig;
 use crate::ledger::Entry;
 use crate::limit::{LimitConfig, Limiting, Limits};
 use crate::parameter::ParameterError;
@@ -35,6 +36,8 @@ pub struct Config<const J: usize> {
     pub period_us: u32,
     /// Encoders and filter.
     pub estimator: EstimatorConfig<J>,
+    /// Motors.
+    pub motors: MotorConfig<J>,
     /// Laws and their gains.
     pub laws: LawsConfig<f32, J>,
     /// Limits.
@@ -355,6 +358,7 @@ fn object<const J: usize, const F: usize>(
 ) -> Option<Refusal> {
     match command {
         Command::Arm if events.contains(Event::FallbackClock) => Some(Refusal::FallbackClock),
+        Command::Arm if events.contains(Event::Unconfirmed) => Some(Refusal::Unconfirmed),
         Command::Arm if params.prepared.watch.silent(&state.watched) => Some(Refusal::NoHeartbeat),
         Command::Grasp(grasp) => {
             let asked = &grasp.gains;

@@ -4,10 +4,11 @@ mod common;
 
 use blindgrasp_shared::command::{Command, Grasp, Refusal};
 use blindgrasp_shared::control::{GAIN_COUNT, PerGain};
-use blindgrasp_shared::device::{Device, Inputs, Outputs, Reading, WAITING_MOST};
+use blindgrasp_shared::device::{Device, Inputs, Outputs, WAITING_MOST};
 use blindgrasp_shared::event::Event;
 use blindgrasp_shared::fault::{Fault, Raised};
 use blindgrasp_shared::identity::{Clock, Identity, Image, ResetCause};
+use blindgrasp_shared::joints::Reading;
 use blindgrasp_shared::link::message::{Form, Packet, Reply, Request, Sample, Signals, not_understood};
 use blindgrasp_shared::link::{self, Receiver, most_bytes};
 use blindgrasp_shared::parameters::{Bound, Parameter, Setting};
@@ -75,16 +76,8 @@ impl Bench {
     }
 
     fn tick_with(&mut self, reading: Reading<12>, dropped: u32, packet: Option<Packet12>) -> Outputs<12> {
-        let inputs = Inputs {
-            reading,
-            late: false,
-            supply_low: false,
-            cycles: 7,
-            dropped,
-            waiting: self.waiting,
-            packet,
-        };
-        self.device.tick(&inputs, &mut self.burst)
+        let inputs = Inputs { cycles: 7, dropped, waiting: self.waiting, packet, ..Inputs::default() };
+        self.device.tick(&reading, &inputs, &mut self.burst)
     }
 
     fn packet(&mut self, request: Request<12>) -> Packet12 {
@@ -359,7 +352,8 @@ fn every_parameter_can_be_read_and_set_back() {
             }
             let refused = |value| Request::SetParameter { parameter, index, value };
             let negative = match parameter.bound() {
-                _ if parameter == Parameter::GRAVITY => None,
+                // A zero may be below zero as well as above.
+                _ if [Parameter::GRAVITY, Parameter::ENCODER_ZERO].contains(&parameter) => None,
                 Bound::AtLeast => Some(Refusal::BeyondFile),
                 Bound::Free | Bound::AtMost => Some(Refusal::OutOfRange),
             };
@@ -462,16 +456,8 @@ fn joints_over_the_link_are_for_another_image_and_real_ones_may_fail() {
     let sample = Sample { counts: List::first_of([0; 12], 12), failed: None, late: false };
     assert_eq!(bench.refused(Request::Joints(sample)), Some(Refusal::JointsAreReal));
     let raised = Raised::at(4, Fault::CounterReset);
-    let inputs = Inputs {
-        reading: Reading::Failed(raised),
-        late: true,
-        supply_low: false,
-        cycles: 0,
-        dropped: 0,
-        waiting: 0,
-        packet: None,
-    };
-    let record = bench.device.tick(&inputs, &mut bench.burst).record;
+    let inputs = Inputs { late: true, ..Inputs::default() };
+    let record = bench.device.tick(&Reading::Failed(raised), &inputs, &mut bench.burst).record;
     assert_eq!((record.mode, record.fault, record.reading_failed), (Mode::Fault, Some(raised), Some(raised)));
     assert!(record.events.contains(Event::Late));
     bench.done(Request::Command(Command::ClearFault));

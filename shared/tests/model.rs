@@ -28,7 +28,7 @@ fn every_bit_comes_back() {
     config.laws.hold.damping_nm_s[11] = -0.0;
     config.laws.hold.gravity_m_s2 = None;
     config.estimator.encoders[11] =
-        Encoder { zero_count: i32::MIN, reversed: true, ..config.estimator.encoders[0] };
+        Encoder { zero_count: -(1 << 24), reversed: true, ..config.estimator.encoders[0] };
     let bytes = bytes(&config);
     println!("{} bytes", bytes.len());
     let params = decode::<JOINTS, 3>(&bytes).expect("it was just written");

@@ -5,11 +5,15 @@ mod common;
 
 use blindgrasp_shared::command::{Command, Grasp};
 use blindgrasp_shared::control::PerGain;
-use blindgrasp_shared::device::{Device, Inputs, Reading};
+use blindgrasp_shared::device::{Device, Inputs};
+use blindgrasp_shared::event::Event;
 use blindgrasp_shared::fault::{Fault, Raised};
-use blindgrasp_shared::identity::{Clock, Identity, Image};
+use blindgrasp_shared::identity::{Clock, Identity, Image, Restored};
+use blindgrasp_shared::joints::Reading;
 use blindgrasp_shared::link::message::{Packet, Reply, Request, Signals};
 use blindgrasp_shared::parameters::{Bound, Parameter};
+use blindgrasp_shared::saved::Order;
+use blindgrasp_shared::store::StoreError;
 use blindgrasp_shared::supervisor::Mode;
 use blindgrasp_shared::telemetry::INTERFACE_VERSION;
 use blindgrasp_shared::telemetry::burst::Burst;
@@ -105,7 +109,7 @@ impl Random {
         let value = [0.5, 1.0, 20.0, 1e9, f32::NAN][self.below(5) as usize];
         let parameter = Parameter::ALL[self.below(Parameter::COUNT as u32) as usize];
         let index = self.below(13) as u8;
-        match self.below(40) {
+        match self.below(46) {
             0 => Request::Hello { interface_version: INTERFACE_VERSION },
             1..=8 => Request::Heartbeat,
             9..=13 => Request::Command(Command::Arm),
@@ -120,13 +124,19 @@ impl Random {
             34 => Request::Telemetry { decimation: 1, signals: Signals::FULL },
             35 => Request::Goodbye,
             36 => Request::Rate { baud: 3_000_000 },
+            37 => Request::Zero { joint: [None, Some(index)][self.below(2) as usize] },
+            38..=42 => Request::Confirm,
+            43 => Request::Save,
+            // Rarely, for it undoes all that the others did.
+            44 if self.below(20) == 0 => Request::Defaults,
             _ => Request::Burst { index: index.into() },
         }
     }
 }
 
 /// A million requests in whatever order, by a host that now and then loses its session, of a hand whose joints jitter and now
-/// and then fail: nothing is armed without a heartbeat, no torque changes by more than its slew limit while there is power,
+/// and then fail, and whose flash does: nothing is armed without a heartbeat, with signs or zeros that nobody has confirmed, or
+/// while parameters are saved, no torque changes by more than its slew limit while there is power,
 /// there is none without, and a fault is left by a `ClearFault` that was taken and by nothing else.
 #[test]
 fn a_million_requests_do_no_harm() {
@@ -143,7 +153,9 @@ fn a_million_requests_do_no_harm() {
     };
     let params = hand();
     let (heartbeat_ms, slew_nm) = (100, params.file().limits.slew_nm_s.unwrap().map(|slew| slew * 1e-3));
-    let mut device = Device::new(params, Identity::of(image, Clock::External));
+    let device = Device::new(params, Identity::of(image, Clock::External));
+    let mut device = device.with_store(Restored::default());
+    let (mut is_saving, mut stored, mut saved) = (false, None, 0);
     let mut burst = Box::new(Burst::new());
     let mut random = Random(1);
     let (mut session, mut sequence) = (0_u16, 0_u16);
@@ -162,16 +174,25 @@ fn a_million_requests_do_no_harm() {
             0 => Reading::Failed(Raised::at(3, Fault::SampleMissing)),
             _ => Reading::Counts(counts),
         };
-        let packet = Some(Packet { session: session_sent, sequence, request: request.clone() });
+        let packet = Packet { session: session_sent, sequence, request: request.clone() };
+        let packet = (random.below(8) != 0).then_some(packet);
         let late = random.below(200) == 0;
-        let inputs = Inputs { reading, late, supply_low: false, cycles: 0, dropped: 0, waiting: 0, packet };
-        let outputs = device.tick(&inputs, &mut burst);
+        let inputs = Inputs { late, packet, stored: stored.take(), ..Inputs::default() };
+        let outputs = device.tick(&reading, &inputs, &mut burst);
+        is_saving &= inputs.stored.is_none();
+        if let Some(order) = outputs.order {
+            is_saving = true;
+            saved += u32::from(order == Order::Finish);
+        }
+        if is_saving && random.below(3) == 0 {
+            stored = Some(if random.below(500) == 0 { Err(StoreError::ReadBack) } else { Ok(()) });
+        }
         let done = match outputs.reply {
             Some(Reply::Identity { session: begun, .. }) => {
                 session = begun;
                 false
             }
-            Some(Reply::Answer { refused, .. }) => refused.is_none(),
+            Some(Reply::Answer { sequence: answered, refused }) => answered == sequence && refused.is_none(),
             _ => false,
         };
         silent = if request == Request::Heartbeat && done { 0 } else { silent.saturating_add(1) };
@@ -179,6 +200,8 @@ fn a_million_requests_do_no_harm() {
         if mode == Mode::Disarmed && now == Mode::Armed {
             assert!(silent <= heartbeat_ms, "armed {silent} ticks after the last heartbeat");
             assert!(done && request == Request::Command(Command::Arm), "armed by {request:?}");
+            assert!(!outputs.record.events.contains(Event::Unconfirmed), "armed without a confirmation");
+            assert!(!is_saving, "armed during a save");
             armed += 1;
         }
         if mode == Mode::Fault && now != Mode::Fault {
@@ -201,6 +224,9 @@ fn a_million_requests_do_no_harm() {
         }
         (mode, torques_nm, powered) = (now, outputs.torques_nm, outputs.powered);
     }
-    println!("{requests} requests: armed {armed}, grasped {grasped}, faults {faults}, cleared {cleared}");
+    println!(
+        "{requests} requests: armed {armed}, grasped {grasped}, faults {faults}, cleared {cleared}, saved {saved}"
+    );
     assert!(armed > requests / 2000 && grasped > requests / 5000 && faults > 10 && cleared > 10);
+    assert!(saved > requests / 10_000);
 }

@@ -3,8 +3,9 @@
 mod common;
 mod flash;
 
+use blindgrasp_shared::identity::Restored;
 use blindgrasp_shared::parameters::{Parameter, Setting};
-use blindgrasp_shared::saved::{Order, Restored, Saving};
+use blindgrasp_shared::saved::{Order, Saving};
 use blindgrasp_shared::store::{Entry, Store, StoreError, key_hash};
 use blindgrasp_shared::tick::Params;
 use common::{JOINTS, config, params};
@@ -40,7 +41,8 @@ fn save(
     for _ in 0..1000 {
         let Some(order) = saving.next(params) else { continue };
         orders.push(order);
-        if let Some(told) = store.obey(&order, HAND) {
+        let told = store.obey(&order, HAND);
+        if told.is_err() || saving.is_over() {
             return (told, orders);
         }
     }
@@ -131,9 +133,9 @@ fn what_does_not_fit_is_left_out_and_told() {
         Order::Put(good),
         Order::Put(not_finite),
     ] {
-        assert_eq!(store.obey(&order, HAND), None);
+        assert_eq!(store.obey(&order, HAND), Ok(()));
     }
-    assert_eq!(store.obey(&Order::Finish, HAND), Some(Ok(())));
+    assert_eq!(store.obey(&Order::Finish, HAND), Ok(()));
     let (found, restored, ignored) = start(store);
     let mut expected = file();
     set(&mut expected, FORCE, 0, 2.0);
@@ -147,7 +149,7 @@ fn another_hands_parameters_are_left_out() {
     let mut store = store();
     let entry = Entry { key: key_hash("force_n"), index: 0, value: 2.0 };
     for order in [Order::Begin(1), Order::Put(entry), Order::Finish] {
-        store.obey(&order, HAND + 1);
+        assert_eq!(store.obey(&order, HAND + 1), Ok(()));
     }
     let (found, restored, ignored) = start(store);
     assert_eq!((found, restored, ignored), (file(), Restored { saved: 1, ignored: 1 }, vec![entry]));
@@ -166,7 +168,8 @@ fn a_set_that_fails_is_told_once_and_the_one_before_stays() {
     }
     assert_eq!(save(&mut store, Saving::DIFFERENCES, &params).0, Err(StoreError::NoSpare));
     let entry = Entry { key: 1, index: 0, value: 1.0 };
-    assert_eq!([Order::Put(entry), Order::Finish].map(|order| store.obey(&order, HAND)), [None, None]);
+    let late = [Order::Put(entry), Order::Finish].map(|order| store.obey(&order, HAND));
+    assert_eq!(late, [Err(StoreError::OutOfOrder); 2]);
     assert_eq!(start(store).0, before);
 }
 
@@ -181,7 +184,7 @@ fn a_limit_that_was_saved_before_its_gain_is_there_again() {
         Order::Put(entry("force_n", 2.0)),
         Order::Finish,
     ] {
-        store.obey(&order, HAND);
+        assert_eq!(store.obey(&order, HAND), Ok(()));
     }
     let (found, restored, _) = start(store);
     assert_eq!(restored, Restored { saved: 2, ignored: 0 });
@@ -194,8 +197,8 @@ fn what_is_looser_than_the_file_is_left_out() {
     let entry = |parameter: Parameter, value| Entry { key: key_hash(parameter.key()), index: 0, value };
     let looser = [entry(Parameter::TORQUE_LIMIT, 100.0), entry(Parameter::STOP_MARGIN, 0.0)];
     let mut store = store();
-    store.obey(&Order::Begin(2), HAND);
-    looser.iter().for_each(|entry| assert_eq!(store.obey(&Order::Put(*entry), HAND), None));
-    assert_eq!(store.obey(&Order::Finish, HAND), Some(Ok(())));
+    assert_eq!(store.obey(&Order::Begin(2), HAND), Ok(()));
+    looser.iter().for_each(|entry| assert_eq!(store.obey(&Order::Put(*entry), HAND), Ok(())));
+    assert_eq!(store.obey(&Order::Finish, HAND), Ok(()));
     assert_eq!(start(store), (file(), Restored { saved: 2, ignored: 2 }, looser.to_vec()));
 }

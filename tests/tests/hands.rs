@@ -159,8 +159,8 @@ fn signs_and_zeros_of_the_file_make_the_same_grasp() {
     let all_reversed = ["hand.joint.*.encoder_reversed=true", "hand.joint.*.motor_reversed=true"];
     let zeros = [
         "hand.joint.*.encoder_zero_count=-12345",
-        "hand.joint.2.encoder_zero_count=2147483647",
-        "hand.joint.3.encoder_zero_count=-2147483648",
+        "hand.joint.2.encoder_zero_count=16777216",
+        "hand.joint.3.encoder_zero_count=-16777216",
         "hand.joint.3.encoder_reversed=true",
     ];
     let noise = ["sensors.noise_counts=1", "duration_s=1"];

@@ -10,7 +10,9 @@ use blindgrasp_shared::command::{Answer, Command, Grasp, Refusal};
 use blindgrasp_shared::control::{GAINS, Gain, LAWS, PerGain, PerSignal, SIGNALS, Signal};
 use blindgrasp_shared::event::{Event, Events};
 use blindgrasp_shared::fault::{Fault, Raised, Reaction};
-use blindgrasp_shared::identity::{BrownOut, Clock, Crash, CrashKind, Identity, Image, ResetCause, UNITS};
+use blindgrasp_shared::identity::{
+    BrownOut, Clock, Crash, CrashKind, Identity, Image, ResetCause, Restored, UNITS,
+};
 use blindgrasp_shared::limit::{Limit, Limiting};
 use blindgrasp_shared::link::message::{Packet, Reply, Request, Sample, Signals};
 use blindgrasp_shared::link::{FrameError, InputRecord, Receiver, encode, most_bytes};
@@ -141,6 +143,11 @@ fn packets() -> Vec<(&'static str, Packet<J>)> {
         ("a record of the burst", Request::Burst { index: 191 }),
         ("goodbye", Request::Goodbye),
         ("a rate", Request::Rate { baud: 3_000_000 }),
+        ("the zero of a joint", Request::Zero { joint: Some(3) }),
+        ("the zeros of all joints", Request::Zero { joint: None }),
+        ("confirm", Request::Confirm),
+        ("save", Request::Save),
+        ("defaults", Request::Defaults),
     ];
     let packet =
         |k: usize, (name, request)| (name, Packet { session: 1, sequence: 0x1234 + k as u16, request });
@@ -160,6 +167,10 @@ fn number(request: &Request<J>) -> usize {
         Request::Burst { .. } => 7,
         Request::Goodbye => 8,
         Request::Rate { .. } => 9,
+        Request::Zero { .. } => 10,
+        Request::Confirm => 11,
+        Request::Save => 12,
+        Request::Defaults => 13,
     }
 }
 
@@ -183,6 +194,7 @@ const IDENTITY: Identity<'static> = Identity {
     clock_hz: 168_000_000,
     most_baud: 1_000_000,
     changed: 0,
+    restored: Restored { saved: 2, ignored: 1 },
 };
 
 /// A hand of three joints in a fault.
@@ -432,7 +444,7 @@ fn malformed() -> Vec<serde_json::Value> {
 fn every_message_is_among_the_vectors() {
     let mut requests: Vec<usize> = packets().iter().map(|(_, packet)| number(&packet.request)).collect();
     requests.dedup();
-    assert_eq!(requests, (0..10).collect::<Vec<_>>());
+    assert_eq!(requests, (0..14).collect::<Vec<_>>());
     let mut numbers: Vec<u8> = replies().iter().map(|(_, reply)| payload(&frame(reply))[0]).collect();
     numbers.dedup();
     assert_eq!(numbers, (0..7).collect::<Vec<_>>());
@@ -475,26 +487,40 @@ fn numbered<T: std::fmt::Debug>(values: &[T], words: impl Fn(&T) -> &'static str
     values.iter().enumerate().map(row).collect()
 }
 
+/// The unit variants of an enum in a sentence, each with its number.
+fn listed<T: std::fmt::Debug>(values: &[T], words: impl Fn(&T) -> &'static str) -> String {
+    let items = numbered(values, words).into_iter().map(|[number, name, words]| {
+        let is_known = name.to_lowercase() == format!("`{words}`");
+        if is_known { format!("{number} {name}") } else { format!("{number} {name} ({words})") }
+    });
+    items.collect::<Vec<_>>().join(", ") + ".\n"
+}
+
+/// Bits in a sentence, each with its meaning.
+fn bits<const N: usize>(bits: [(u8, &'static str); N]) -> String {
+    bits.map(|(bit, words)| format!("{bit} {words}")).join(", ") + ".\n"
+}
+
 #[test]
 fn the_tables_of_the_document_are_those_of_the_code() {
     let three = ["number", "name", "meaning"];
-    let commands: Vec<[String; 3]> = (0..)
+    let commands: Vec<String> = (0..)
         .zip(Command::ALL)
         .map(|(k, command): (usize, _)| {
-            let fields = match command {
-                Command::Grasp(_) => {
-                    let gains = GAINS.map(|gain| format!("`{}`: option of f32", gain.key));
-                    gains.join("; ")
-                }
-                _ => String::new(),
-            };
             assert_eq!(payload(&frame(&command))[0], k as u8);
-            [k.to_string(), command.words().to_owned(), fields.to_owned()]
+            let words = command.words();
+            match command {
+                Command::Grasp(_) => {
+                    let gains = GAINS.map(|gain| format!("`{}`", gain.key)).join(", ");
+                    format!("{k} {words} (of {gains} an option of f32 each)")
+                }
+                _ => format!("{k} {words}"),
+            }
         })
         .collect();
-    check(DOCUMENT, "commands", &table(["number", "command", "gains"], &commands));
+    check(DOCUMENT, "commands", &(commands.join(", ") + ".\n"));
     check(DOCUMENT, "refusals", &table(three, &numbered(Refusal::ALL, |refusal| refusal.words())));
-    check(DOCUMENT, "modes", &table(three, &numbered(&Mode::ALL, |mode| mode.words())));
+    check(DOCUMENT, "modes", &listed(&Mode::ALL, |mode| mode.words()));
     let faults: Vec<[String; 4]> = Fault::ALL
         .iter()
         .map(|fault| {
@@ -524,9 +550,12 @@ fn the_tables_of_the_document_are_those_of_the_code() {
     check(DOCUMENT, "parameters", &table(head, &parameters));
     let mut signals = Vec::new();
     AnyRecord::BLANK.tell(|told: Told<'_>| {
-        let each = if told.each == Each::Joint { "joint" } else { "" };
         let Signal { key, unit, words } = told.signal;
-        signals.push([format!("`{key}`"), each.into(), unit.into(), words.into()]);
+        // Events and gains have their words above.
+        if Event::ALL.iter().all(|event| event.key() != key) && GAINS.iter().all(|gain| gain.key != key) {
+            let each = if told.each == Each::Joint { " (each joint)" } else { "" };
+            signals.push([format!("`{key}`{each}"), unit.into(), words.into()]);
+        }
     });
     let record: Vec<[String; 2]> = AnyRecord::FIELDS
         .iter()
@@ -555,15 +584,11 @@ fn the_tables_of_the_document_are_those_of_the_code() {
         })
         .collect();
     check(DOCUMENT, "gains", &table(["law", "gain", "unit", "potential"], &gains));
-    check(DOCUMENT, "signals", &table(["signal", "of each", "unit", "meaning"], &signals));
-    let bits: Vec<[String; 2]> =
-        Limit::ALL.map(|limit| [(limit as u8).to_string(), limit.words().to_owned()]).into();
-    check(DOCUMENT, "limits", &table(["bit", "what limits the joint"], &bits));
-    let bits: Vec<[String; 2]> =
-        Event::ALL.map(|event| [(event as u8).to_string(), event.words().to_owned()]).into();
-    check(DOCUMENT, "events", &table(["bit", "what happened"], &bits));
+    check(DOCUMENT, "signals", &table(["signal", "unit", "meaning"], &signals));
+    check(DOCUMENT, "limits", &bits(Limit::ALL.map(|limit| (limit as u8, limit.words()))));
+    check(DOCUMENT, "events", &bits(Event::ALL.map(|event| (event as u8, event.words()))));
     let clocks = [Clock::External, Clock::Fallback, Clock::Emulated];
-    check(DOCUMENT, "clocks", &table(three, &numbered(&clocks, |clock| clock.words())));
+    check(DOCUMENT, "clocks", &listed(&clocks, |clock| clock.words()));
     let causes = [
         ResetCause::PowerOn,
         ResetCause::BrownOut,
@@ -574,9 +599,9 @@ fn the_tables_of_the_document_are_those_of_the_code() {
         ResetCause::LowPower,
         ResetCause::Unknown,
     ];
-    check(DOCUMENT, "resets", &table(three, &numbered(&causes, |cause| cause.words())));
+    check(DOCUMENT, "resets", &listed(&causes, |cause| cause.words()));
     let levels = [BrownOut::Level3, BrownOut::Level2, BrownOut::Level1, BrownOut::Off, BrownOut::Unknown];
-    check(DOCUMENT, "brown-out levels", &table(three, &numbered(&levels, |level| level.words())));
+    check(DOCUMENT, "brown-out levels", &listed(&levels, |level| level.words()));
 }
 
 /// The tables of the Python client, written from those of the code.
@@ -659,7 +684,7 @@ fn the_examples_of_the_document_are_those_of_the_code() {
         named.unwrap_or_else(|| panic!("there is no vector {name}"))
     };
     let mut text = String::new();
-    for name in ["hello", "arm", "refused", "grasp with 3.5 N"] {
+    for name in ["hello", "arm", "grasp with 3.5 N"] {
         let vector = find(name);
         let words = |key: &str| vector[key].as_str().expect("a text").to_owned();
         let _ = write!(

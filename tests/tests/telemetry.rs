@@ -8,9 +8,10 @@ use blindgrasp::sim::Simulation;
 use blindgrasp::sim::controller::{Controller, Stepped, Turn};
 use blindgrasp::{MAX_FINGERS, MAX_JOINTS};
 use blindgrasp_shared::command::{Command, Grasp};
-use blindgrasp_shared::device::{Device, Inputs, Outputs, Reading, WAITING_MOST};
+use blindgrasp_shared::device::{Device, Inputs, Outputs, WAITING_MOST};
 use blindgrasp_shared::fault::{Fault, FaultConfig, Raised};
 use blindgrasp_shared::identity::{Clock, Identity, Image};
+use blindgrasp_shared::joints::Reading;
 use blindgrasp_shared::link::message::{Packet, Reply, Request, Signals};
 use blindgrasp_shared::link::{InputRecord, Receiver, encode, most_bytes};
 use blindgrasp_shared::math::Real;
@@ -120,15 +121,13 @@ impl Line {
             Packet { session: self.session, sequence: self.sequence, request }
         });
         let inputs = Inputs {
-            reading,
-            late: false,
-            supply_low: false,
             cycles: 16_000,
             dropped: self.dropped,
             waiting: self.telemetry.len(),
             packet,
+            ..Inputs::default()
         };
-        let outputs = self.device.tick(&inputs, &mut self.burst);
+        let outputs = self.device.tick(&reading, &inputs, &mut self.burst);
         if let Some(reply) = &outputs.reply {
             if let Reply::Identity { session, .. } = reply {
                 self.session = *session;
@@ -402,16 +401,8 @@ fn the_burst_is_at_full_rate_whatever_the_decimation() {
         let packet =
             Packet { session: line.session, sequence: line.sequence, request: Request::Burst { index } };
         let packet = Some(packet);
-        let inputs = Inputs {
-            reading: still,
-            late: false,
-            supply_low: false,
-            cycles: 0,
-            dropped: line.dropped,
-            waiting: 0,
-            packet,
-        };
-        match line.device.tick(&inputs, &mut line.burst).reply {
+        let inputs = Inputs { dropped: line.dropped, packet, ..Inputs::default() };
+        match line.device.tick(&still, &inputs, &mut line.burst).reply {
             Some(Reply::Burst { record, .. }) => ticks.push(record.tick),
             other => panic!("{other:?}"),
         }

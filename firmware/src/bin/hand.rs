@@ -49,7 +49,7 @@ mod app {
         let (interrupt, line, streams) = serial::start(device.USART2, dma, line_pins, rcc)
             .expect("the board's baud rate can be had from its clock");
         let (receiving, sending) = streams.unzip();
-        let (queues, link_end) = cx.local.all_queues.split();
+        let (queues, link_end, _) = cx.local.all_queues.split();
         let controller = boot.device(&IMAGE_HAND);
         let period_us = controller.params().config().period_us;
 

@@ -31,32 +31,18 @@
 pub mod dac;
 pub mod ls7366r;
 
-use blindgrasp_shared::device::Reading;
 use blindgrasp_shared::fault::{Fault, Raised};
+use blindgrasp_shared::joints::{Joints, Reading};
 use core::fmt;
 use dac::{CHANNELS, CODES_PER_VOLT, Dac, DacError};
 use embedded_hal::digital::OutputPin;
 use embedded_hal::spi::SpiDevice;
 use ls7366r::{Counter, CounterError, FilterClock, Zero};
 
-/// What the control task needs of the joints.
-pub trait Joints<const J: usize> {
-    /// Reads the encoder counts of all joints.
-    fn read(&mut self) -> Reading<J>;
-
-    /// Sets the torques of all joints, N m, and whether the amplifiers have power. A torque that is not a finite number
-    /// sets 0 N m. What went wrong is returned.
-    fn write(&mut self, torques_nm: &[f32; J], powered: bool) -> Option<Raised>;
-
-    /// The user has cleared the fault: joints that have passed their self-test try to work again. Whether they do, the
-    /// next [`read`](Self::read) tells.
-    fn recover(&mut self) {}
-}
-
 /// How a torque becomes a voltage.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct OutputConfig {
-    /// Torque at the joint for each volt at the amplifier's input, N m/V; negative if the motor turns the other way.
+    /// Torque at the joint for each volt at the amplifier's input, N m/V.
     pub nm_per_volt: f32,
 }
 
@@ -180,7 +166,7 @@ pub struct BoardJoints<C, O, E, const J: usize, const D: usize> {
 
 impl<C: SpiDevice, O: SpiDevice, E: OutputPin, const J: usize, const D: usize> BoardJoints<C, O, E, J, D> {
     /// Switches everything off, tests all chips, and starts them. Takes about 4 ms for 12 joints. That a test failed
-    /// is no error here: [`failure`](Self::failure) and every [`read`](Joints::read) tell it.
+    /// is no error here: [`failure`](Self::failure) and every [`collect`](Joints::collect) tell it.
     ///
     /// The pin `enable` enables the amplifiers of all joints while it is high; a resistor has to hold it low until then.
     ///
@@ -225,7 +211,7 @@ impl<C: SpiDevice, O: SpiDevice, E: OutputPin, const J: usize, const D: usize> B
         }
         joints.recover();
         // Whether the counters count: a failure is told by the next reading.
-        joints.read();
+        joints.collect();
         Ok(joints)
     }
 
@@ -343,7 +329,7 @@ impl<C: SpiDevice, O: SpiDevice, E: OutputPin, const J: usize, const D: usize> B
 impl<C: SpiDevice, O: SpiDevice, E: OutputPin, const J: usize, const D: usize> Joints<J>
     for BoardJoints<C, O, E, J, D>
 {
-    fn read(&mut self) -> Reading<J> {
+    fn collect(&mut self) -> Reading<J> {
         match self.state {
             State::Running => match self.read_counts() {
                 Ok(counts) => Reading::Counts(counts),
@@ -362,7 +348,7 @@ impl<C: SpiDevice, O: SpiDevice, E: OutputPin, const J: usize, const D: usize> J
 
     fn write(&mut self, torques_nm: &[f32; J], powered: bool) -> Option<Raised> {
         if !matches!(self.state, State::Running) {
-            // Once more: the first time may have been lost on the bus. What is wrong, `read` has told.
+            // Once more: the first time may have been lost on the bus. What is wrong, `collect` has told.
             switch_off(&mut self.enable, &mut self.dacs);
             return None;
         }

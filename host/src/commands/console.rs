@@ -6,9 +6,11 @@ use blindgrasp::device::recorder::{ENDED_ANOTHER, Recorder, Recording};
 use blindgrasp::device::talk::{self, Event, SELDOM, Talk, TalkError, telemetry};
 use blindgrasp::device::transport::{Transport, TransportError};
 use blindgrasp::scene::HandModel;
-use blindgrasp::wire::{Answer, Firmware, Record, Request, label, potentials, scalars};
+use blindgrasp::wire::{Answer, Firmware, Record, Request, label, potentials, scalars, take_encoder};
 use blindgrasp_shared::command::{self, Command, Grasp, Refusal};
 use blindgrasp_shared::control::{GAIN_COUNT, GAINS};
+use blindgrasp_shared::estimate::Encoder;
+use blindgrasp_shared::identity::Restored;
 use blindgrasp_shared::parameters::{Bound, Each, Parameter, Setting};
 use clap::Args;
 use std::collections::VecDeque;
@@ -27,7 +29,7 @@ const SENDING: Duration = Duration::from_secs(1);
 /// Ticks from one recorded record to the next.
 const EVERY_TICK: u16 = 1;
 /// What can be typed, and what it does.
-const WORDS: [(&str, &str, &str); 12] = [
+const WORDS: [(&str, &str, &str); 17] = [
     ("help", "", "show this"),
     ("status", "", "mode, fault, counts, torques, what limits, and what went over the line"),
     ("arm", "", "let the joints have torque: hold their weight and damp them"),
@@ -42,6 +44,15 @@ const WORDS: [(&str, &str, &str); 12] = [
     ("clear", "", "leave a fault whose cause is gone"),
     ("get", "[KEY [INDEX]]", "show parameters"),
     ("set", "KEY [INDEX] VALUE", "set a parameter, of all joints or axes without INDEX; disarmed only"),
+    ("differs", "", "show the parameters that are other than in the hand's file"),
+    ("zero", "[JOINT]", "the joints, or this one, stand at angle zero: set their zeros so; disarmed only"),
+    (
+        "confirm",
+        "",
+        "the angles that `status` shows are right: allow to arm with the signs and zeros that were set",
+    ),
+    ("save", "", "keep the parameters that were set over a reset; disarmed only"),
+    ("defaults", "", "forget what was saved and set: the hand's file holds again; disarmed only"),
     ("watch", "MS|off", "show angles and torques all the time"),
     ("quit", "", "stop, and end"),
 ];
@@ -102,6 +113,9 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
         joint_count: 0,
         period_us: 1000,
         hand: None,
+        encoders: Vec::new(),
+        unshown: 0,
+        differing: None,
         status: Status::Shown,
         watch_ticks: None,
         watched: None,
@@ -200,6 +214,12 @@ struct Console {
     period_us: u32,
     /// What the firmware was built with, if that is known.
     hand: Option<HandModel>,
+    /// Of a hand that is known, with the signs and zeros in force.
+    encoders: Vec<Encoder>,
+    /// Answers about them that are not shown.
+    unshown: usize,
+    /// While parameters are compared with the hand's file: how many differ so far.
+    differing: Option<usize>,
     status: Status,
     /// From one line of `watch` to the next.
     watch_ticks: Option<u32>,
@@ -257,6 +277,14 @@ impl Console {
             self.stop(false, now);
         }
         let is_ready = self.recorder.as_ref().is_none_or(Recorder::is_ready);
+        if self.talk.is_idle()
+            && let Some(count) = self.differing.take()
+        {
+            say(match count {
+                0 => "every parameter is as in the hand's file".to_owned(),
+                count => format!("{count} differ from the hand's file"),
+            })?;
+        }
         if self.talk.is_idle() && is_ready && self.status == Status::Shown && !self.is_quitting {
             match self.typed.lines.pop_front() {
                 Some(line) => {
@@ -341,6 +369,15 @@ impl Console {
             ("get", []) => return self.get(&Parameter::ALL, None, now),
             ("get", [key]) => return self.get(&[parameter(key)?], None, now),
             ("get", [key, index]) => return self.get(&[parameter(key)?], Some(integer(index)?), now),
+            ("differs", []) => {
+                self.differing = Some(0);
+                return self.get(&Parameter::ALL, None, now);
+            }
+            ("zero", []) => return self.ask(Request::Zero { joint: None }, now),
+            ("zero", [joint]) => return self.ask(Request::Zero { joint: Some(integer(joint)?) }, now),
+            ("confirm", []) => return self.ask(Request::Confirm, now),
+            ("save", []) => return self.ask(Request::Save, now),
+            ("defaults", []) => return self.ask(Request::Defaults, now),
             ("set", [key, value]) => return self.set(parameter(key)?, None, number(value)?, now),
             ("set", [key, index, value]) => {
                 return self.set(parameter(key)?, Some(integer(index)?), number(value)?, now);
@@ -348,6 +385,11 @@ impl Console {
             _ => bail!(misuse(word)),
         };
         self.talk.ask(Request::Command(command), now);
+        Ok(())
+    }
+
+    fn ask(&mut self, request: Request, now: Instant) -> anyhow::Result<()> {
+        self.talk.ask(request, now);
         Ok(())
     }
 
@@ -406,6 +448,9 @@ impl Console {
         match event {
             Event::Open { firmware, period_us, ends_another } => {
                 self.greet(&firmware, period_us)?;
+                if firmware.changed.iter().any(|parameter| parameter.is_reading()) {
+                    self.learn_reading(now);
+                }
                 if ends_another {
                     eprintln!("blindgrasp: warning: {ENDED_ANOTHER}");
                 }
@@ -414,7 +459,9 @@ impl Console {
             Event::StartedAnew => {
                 (self.status, self.watch_ticks) = (Status::Shown, None);
                 self.typed.lines.clear();
-                say("the device was reset: it has forgotten the session, and what was set; hello again")?;
+                say(
+                    "the device was reset: it has forgotten the session, and what was not saved; hello again",
+                )?;
                 if !self.typed.by_hand {
                     // It might arm with other limits than it has set.
                     bail!("the device was reset, which ends a script");
@@ -437,6 +484,37 @@ impl Console {
                     (Request::Command(Command::Stop), _) if self.is_quitting => {
                         bail!("{}: take the motors' power away", answered(&request, &answer))
                     }
+                    (&Request::GetParameter { parameter, index }, answer)
+                        if self.unshown > 0 && parameter.is_reading() =>
+                    {
+                        self.unshown -= 1;
+                        if let Answer::Value(setting) = answer {
+                            take_encoder(&mut self.encoders, parameter, index, setting.value);
+                        }
+                        return Ok(());
+                    }
+                    (&Request::GetParameter { parameter, index }, Answer::Value(Setting { value, file })) => {
+                        take_encoder(&mut self.encoders, parameter, index, *value);
+                        match &mut self.differing {
+                            Some(_) if value == file => return Ok(()),
+                            Some(count) => *count += 1,
+                            None => {}
+                        }
+                    }
+                    (Request::GetParameter { .. }, Answer::Refused(Refusal::SwitchedOff))
+                        if self.differing.is_some() =>
+                    {
+                        return Ok(());
+                    }
+                    (&Request::SetParameter { parameter, index, value }, Answer::Done) => {
+                        take_encoder(&mut self.encoders, parameter, index, value);
+                    }
+                    // What was set is shown.
+                    (&Request::Zero { joint }, Answer::Done) => {
+                        say(answered(&request, &answer))?;
+                        return self.get(&[Parameter::ENCODER_ZERO], joint, now);
+                    }
+                    (Request::Defaults, Answer::Done) => self.learn_reading(now),
                     _ => {}
                 }
                 say(answered(&request, &answer))?;
@@ -455,7 +533,7 @@ impl Console {
                 Ok(())
             }
             Event::Unanswered(request) => {
-                self.status = Status::Shown;
+                (self.status, self.unshown, self.differing) = (Status::Shown, 0, None);
                 eprintln!("blindgrasp: {}: no answer; whether it was done is not known", name(&request));
                 self.not_done(&request, None, now);
                 Ok(())
@@ -473,6 +551,7 @@ impl Console {
         let (clock, reset, brown_out) = (clock.words(), reset.words(), brown_out.words());
         say(format_args!("clock: {clock}; started by: {reset}; brown-out reset: {brown_out}"))?;
         say(format_args!("last crash: {crash}"))?;
+        self.tell_differences(firmware)?;
         let file = self.wanted_hand.as_deref().unwrap_or(&firmware.hand);
         self.hand = match HandModel::load(file) {
             Ok(hand) if hand.hash() == firmware.hand_hash => Some(hand),
@@ -487,7 +566,36 @@ impl Console {
                 None
             }
         };
+        let encoders = self.hand.as_ref().map_or(&[][..], |hand| &hand.config.estimator.encoders);
+        self.encoders = encoders.to_vec();
+        self.unshown = 0;
         Ok(())
+    }
+
+    /// Tells what is in force besides the hand's file.
+    fn tell_differences(&self, firmware: &Firmware) -> anyhow::Result<()> {
+        if !firmware.changed.is_empty() {
+            let keys = firmware.changed.iter().map(ToString::to_string).collect::<Vec<_>>();
+            say(format_args!("other than in the hand's file: {}; `differs` shows them", keys.join(", ")))?;
+        }
+        let Restored { saved, ignored } = firmware.restored;
+        if ignored > 0 {
+            eprintln!(
+                "blindgrasp: warning: of {saved} parameters that were saved {ignored} are not in force: they were saved for another hand \
+                 or by another firmware, or are looser than the hand's file; set what is missing and `save`, or `defaults`"
+            );
+        }
+        Ok(())
+    }
+
+    /// Asks for the signs and zeros that angles are computed with; they are not shown.
+    fn learn_reading(&mut self, now: Instant) {
+        for parameter in Parameter::ALL.into_iter().filter(|parameter| parameter.is_reading()) {
+            for index in self.indices(parameter, None) {
+                self.talk.ask(Request::GetParameter { parameter, index }, now);
+                self.unshown += 1;
+            }
+        }
     }
 
     fn look(&mut self, record: &Record) -> anyhow::Result<()> {
@@ -520,10 +628,7 @@ impl Console {
 
     /// Angle of a joint as its count tells it, if the hand is known and was read.
     fn angle_rad(&self, record: &Record, joint: usize) -> Option<f32> {
-        let encoder = self.hand.as_ref()?.config.estimator.encoders.get(joint)?;
-        let turned = record.counts.as_slice().get(joint)?.wrapping_sub(encoder.zero_count) as f32
-            * encoder.rad_per_count;
-        Some(if encoder.reversed { -turned } else { turned })
+        Some(self.encoders.get(joint)?.angle_rad(*record.counts.as_slice().get(joint)?))
     }
 
     fn table(&self, record: &Record) -> String {
@@ -593,6 +698,11 @@ fn name(request: &Request) -> String {
         Request::SetParameter { parameter, index, value } => {
             format!("{} = {value}", indexed(parameter, index))
         }
+        Request::Zero { joint: None } => "zero".to_owned(),
+        Request::Zero { joint: Some(joint) } => format!("zero of joint {joint}"),
+        Request::Confirm => "confirm".to_owned(),
+        Request::Save => "save".to_owned(),
+        Request::Defaults => "defaults".to_owned(),
         _ => "records".to_owned(),
     }
 }

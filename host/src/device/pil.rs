@@ -367,6 +367,7 @@ impl<P: Peer> Pilot<P> {
     /// Sets parameters. Some have to fit others, so that it depends on the order whether they are taken: what is refused
     /// is tried again after the others.
     fn configure(&mut self, mut changes: Vec<(Parameter, u8, f32)>, sample: &Sample) -> Result<(), PilError> {
+        let is_read_otherwise = changes.iter().any(|(parameter, ..)| parameter.is_reading());
         while !changes.is_empty() {
             let mut left = Vec::new();
             let mut first_refusal = None;
@@ -390,6 +391,11 @@ impl<P: Peer> Pilot<P> {
                 Some(error) if left.len() == changes.len() => return Err(error),
                 _ => changes = left,
             }
+        }
+        if is_read_otherwise {
+            // Where the joints are, the plant knows.
+            let words = self.words(&Request::Confirm);
+            done(self.ask(Request::Confirm, sample)?, words)?;
         }
         Ok(())
     }

@@ -295,7 +295,10 @@ impl Recorder {
                 self.set(*parameter, *index, Some(*value));
                 self.changed = Some(now + SETTLED);
             }
-            Event::Unanswered(Request::SetParameter { .. }) => self.ask_parameters(talk, now),
+            Event::Answer(Request::Zero { .. } | Request::Defaults, Answer::Done)
+            | Event::Unanswered(Request::SetParameter { .. } | Request::Zero { .. } | Request::Defaults) => {
+                self.ask_parameters(talk, now);
+            }
             Event::Fault(Some(_)) if self.burst.is_none() => {
                 self.burst = Some(Burst { next: 0, count: None, due: now + BURST, tries: 0, asked: false });
             }

@@ -14,9 +14,10 @@ use crate::sim::encoders::Encoders;
 use crate::sim::motors::Motors;
 use crate::wire::Packet;
 use crate::{MAX_FINGERS, MAX_JOINTS, sim};
-use blindgrasp_shared::device::{Device, Inputs, Outputs, Reading};
+use blindgrasp_shared::device::{Device, Inputs, Outputs};
 use blindgrasp_shared::fault::{Fault, Raised};
 use blindgrasp_shared::identity::{Clock, Identity, Image, ResetCause};
+use blindgrasp_shared::joints::Reading;
 use blindgrasp_shared::supervisor::Mode;
 use blindgrasp_shared::telemetry::INTERFACE_VERSION;
 use blindgrasp_shared::telemetry::burst::Burst;
@@ -149,10 +150,13 @@ impl SimulatedHand {
     pub fn turn(&mut self, turn: Turn) -> (Outputs<MAX_JOINTS>, Option<Happening>) {
         let Turn { packet, late, dropped, waiting } = turn;
         // There is no processor whose cycles could be counted.
-        let inputs =
-            Inputs { reading: self.read(), late, supply_low: false, cycles: 0, dropped, waiting, packet };
-        let outputs = self.device.tick(&inputs, &mut self.burst);
-        let wanted_nm = self.delay.pass(outputs.torques_nm);
+        let inputs = Inputs { late, dropped, waiting, packet, ..Inputs::default() };
+        let reading = self.read();
+        let outputs = self.device.tick(&reading, &inputs, &mut self.burst);
+        let mut wanted_nm = outputs.torques_nm;
+        // The motors are as the hand's file says, whatever the controller believes of them.
+        self.model.config.motors.turn(&mut wanted_nm);
+        let wanted_nm = self.delay.pass(wanted_nm);
         let happened = self.move_on(outputs.record.mode, &wanted_nm);
         (outputs, happened)
     }

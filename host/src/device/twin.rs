@@ -4,9 +4,10 @@ use super::pil::{Peer, PilError};
 use crate::scene::HandModel;
 use crate::wire::{Answer, Firmware, Packet, Sample, Turned};
 use crate::{MAX_FINGERS, MAX_JOINTS};
-use blindgrasp_shared::device::{Device, Inputs, Reading};
+use blindgrasp_shared::device::{Device, Inputs};
 use blindgrasp_shared::fault::{Fault, Raised};
 use blindgrasp_shared::identity::{Clock, Identity, Image};
+use blindgrasp_shared::joints::Reading;
 use blindgrasp_shared::link::message::Reply;
 use blindgrasp_shared::parameter::ParameterError;
 use blindgrasp_shared::telemetry::INTERFACE_VERSION;
@@ -55,16 +56,8 @@ impl Twin {
             None if whole => Reading::Counts(padded),
             None => Reading::Failed(Raised::at(counts.len(), Fault::SampleMissing)),
         };
-        let inputs = Inputs {
-            reading,
-            late: sample.late,
-            supply_low: false,
-            cycles: 0,
-            dropped: 0,
-            waiting: 0,
-            packet: packet.cloned(),
-        };
-        let outputs = self.device.tick(&inputs, &mut self.burst);
+        let inputs = Inputs { late: sample.late, packet: packet.cloned(), ..Inputs::default() };
+        let outputs = self.device.tick(&reading, &inputs, &mut self.burst);
         let answer = match outputs.reply {
             None | Some(Reply::Record(_) | Reply::Snapshot(_) | Reply::Input(_)) => None,
             Some(Reply::Identity { session, identity, .. }) => {

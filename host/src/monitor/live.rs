@@ -303,7 +303,7 @@ impl Follower {
                 }
             }
             Event::StartedAnew => {
-                let words = "the device was reset: it has forgotten the session, and what was set";
+                let words = "the device was reset: it has forgotten the session, and what was not saved";
                 self.news(News::Cut(words.into()));
             }
             Event::Mode(mode) => self.note(Level::Info, format!("mode: {}", mode.words())),
@@ -386,8 +386,12 @@ impl Follower {
 fn ask_for_everything(firmware: &Firmware, talk: &mut Talk, now: Instant) {
     talk.ask(Request::Telemetry { decimation: 1, signals: Signals::ALL }, now);
     talk.ask(Request::GetParameter { parameter: Parameter::HEARTBEAT_TIME, index: 0 }, now);
-    for index in 0..u8::try_from(firmware.joint_count).unwrap_or(u8::MAX) {
-        talk.ask(Request::GetParameter { parameter: Parameter::TORQUE_LIMIT, index }, now);
+    // Without an answer, or one that says otherwise, they are as in the hand's file.
+    let reading = firmware.changed.iter().copied().filter(|parameter| parameter.is_reading());
+    for parameter in reading.chain([Parameter::TORQUE_LIMIT]) {
+        for index in 0..parameter.count(firmware.joint_count) {
+            talk.ask(Request::GetParameter { parameter, index }, now);
+        }
     }
 }
 

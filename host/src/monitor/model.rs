@@ -6,10 +6,10 @@
 use super::history::{History, Range};
 use super::rate::Rate;
 use crate::scene::HandModel;
-use crate::wire::Record;
-use crate::wire::{label, potentials, scalars};
+use crate::wire::{Record, label, potentials, scalars, take_encoder};
 use blindgrasp_shared::command::{Command, Refusal};
 use blindgrasp_shared::control::Signal;
+use blindgrasp_shared::estimate::Encoder;
 use blindgrasp_shared::event;
 use blindgrasp_shared::limit::Limiting;
 use blindgrasp_shared::link::rate::FIRST_BAUD;
@@ -217,6 +217,8 @@ pub struct Model {
     heartbeat_ms: Option<f32>,
     heartbeat_at: Option<Duration>,
     torque_limits_nm: Vec<Option<f32>>,
+    /// Of a hand that is known.
+    encoders: Vec<Encoder>,
     notices: VecDeque<Notice>,
     history: History,
 }
@@ -243,6 +245,7 @@ impl Model {
             heartbeat_ms: None,
             heartbeat_at: None,
             torque_limits_nm: Vec::new(),
+            encoders: Vec::new(),
             notices: VecDeque::new(),
             history: History::default(),
         }
@@ -275,6 +278,8 @@ impl Model {
         self.torque_limits_nm = (0..session.joint_count)
             .map(|joint| hand?.config.limits.torque_nm.as_ref()?.get(joint).copied())
             .collect();
+        let encoders = hand.map_or(&[][..], |hand| &hand.config.estimator.encoders);
+        self.encoders = encoders.iter().take(session.joint_count).copied().collect();
         let joints = |session: &Session| (session.hand_hash, session.joint_count);
         if self.session.as_ref().is_some_and(|before| joints(before) != joints(&session)) {
             self.record = None;
@@ -312,7 +317,11 @@ impl Model {
                     *limit = value;
                 }
             }
-            _ => {}
+            _ => {
+                if let Some(value) = value {
+                    take_encoder(&mut self.encoders, parameter, index, value);
+                }
+            }
         }
     }
 
@@ -410,6 +419,9 @@ impl Model {
             Outcome::Enter(_) if record.events.contains(event::Event::FallbackClock) => {
                 Some(Refusal::FallbackClock.words())
             }
+            Outcome::Enter(_) if record.events.contains(event::Event::Unconfirmed) => {
+                Some(Refusal::Unconfirmed.words())
+            }
             Outcome::Enter(_) => None,
         }
     }
@@ -488,13 +500,10 @@ impl Model {
         let record = self.record();
         let count = record.and_then(|record| record.counts.as_slice().get(joint).copied());
         // Angle of so many counts from somewhere; counts without a hand.
-        let turn = |counts: i32| match hand.and_then(|hand| hand.config.estimator.encoders.get(joint)) {
-            Some(encoder) => {
-                counts as f32 * encoder.rad_per_count * if encoder.reversed { -1.0 } else { 1.0 }
-            }
-            None => counts as f32,
+        let encoder = self.encoders.get(joint);
+        let turn = |counts: i32| {
+            encoder.map_or(counts as f32, |encoder| counts as f32 * encoder.rad_per_count * encoder.sign())
         };
-        let zero = hand.and_then(|hand| hand.config.estimator.encoders.get(joint)).map(|e| e.zero_count);
         let speed = || {
             let ((first, before), (last, after)) = (self.counts.front()?, self.counts.back()?);
             let ticks = last.wrapping_sub(*first);
@@ -504,7 +513,7 @@ impl Model {
         Joint {
             name: hand.and_then(|hand| hand.joint_names.get(joint)).map(String::as_str),
             count,
-            angle_rad: count.zip(zero).map(|(count, zero)| turn(count.wrapping_sub(zero))),
+            angle_rad: count.zip(encoder).map(|(count, encoder)| encoder.angle_rad(count)),
             range_rad: hand.map(|hand| {
                 let (lower, upper) = hand.hand.range_rad(joint);
                 (lower as f32, upper as f32)
@@ -680,6 +689,8 @@ pub(super) mod tests {
         );
         let events = Events::NONE.with(event::Event::FallbackClock, true);
         assert_eq!(why(Record { events, ..record(3) }), Some(Refusal::FallbackClock.words()));
+        let events = Events::NONE.with(event::Event::Unconfirmed, true);
+        assert_eq!(why(Record { events, ..record(4) }), Some(Refusal::Unconfirmed.words()));
     }
 
     #[test]

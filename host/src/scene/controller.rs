@@ -5,6 +5,7 @@ use crate::MAX_JOINTS;
 use blindgrasp_shared::control::{Hold, LawsConfig};
 use blindgrasp_shared::estimate::{Encoder, EstimatorConfig};
 use blindgrasp_shared::fault::FaultConfig;
+use blindgrasp_shared::joints::MotorConfig;
 use blindgrasp_shared::limit::LimitConfig;
 use blindgrasp_shared::math::Real;
 use blindgrasp_shared::supervisor::SupervisorConfig;
@@ -52,6 +53,11 @@ impl Setup<'_> {
                         rad_per_count: (TAU / joint.encoder_counts_per_turn) as f32,
                         reversed: joint.encoder_reversed,
                     })
+                }),
+            },
+            motors: MotorConfig {
+                reversed: std::array::from_fn(|k| {
+                    self.joints.get(k).is_some_and(|joint| joint.motor_reversed)
                 }),
             },
             laws: self.laws(),

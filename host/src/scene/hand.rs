@@ -11,6 +11,7 @@ use crate::plant::contact::FingertipModel;
 use crate::plant::friction::JointFriction;
 use crate::{Hand, MAX_FINGERS, MAX_JOINTS, Posture};
 use blindgrasp_shared::{
+    estimate::Encoder,
     hand::{Fingertip, HandError, Joint, Link},
     math::Real,
 };
@@ -157,6 +158,8 @@ fn check_joint(joint: &JointFile, key: &dyn Fn(&str) -> String) -> Result<()> {
     within(&key("torque_limit_nm"), joint.torque_limit_nm, 1e-9, 1e6)?;
     within(&key("speed_limit_rad_s"), joint.speed_limit_rad_s, 1e-6, 1e6)?;
     within(&key("encoder_counts_per_turn"), joint.encoder_counts_per_turn, 8.0, 1e9)?;
+    let most_zero_count = f64::from(Encoder::MOST_ZERO_COUNT);
+    all_within(&key("encoder_zero_count"), &[f64::from(joint.encoder_zero_count)], most_zero_count)?;
     within(&key("torque_per_volt_nm_v"), joint.torque_per_volt_nm_v, 1e-6, 1e4)
         .map_err(|error| SceneError { remedy: error.remedy + "; its sign is `motor_reversed`", ..error })?;
     within(&key("viscous_friction_nm_s_rad"), joint.viscous_friction_nm_s_rad, 0.0, 1e6)?;

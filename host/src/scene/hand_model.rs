@@ -30,7 +30,7 @@ pub struct HandModel {
     pub joint_names: Vec<String>,
     /// The controller's configuration; zero beyond the hand's joints.
     pub config: Config<MAX_JOINTS>,
-    /// Torque at each joint for each volt at its amplifier, N m/V; negative where the motor is reversed.
+    /// Torque at each joint for each volt at its amplifier, N m/V.
     pub torques_per_volt_nm_v: Vec<f32>,
     /// What is odd but can be used, in words.
     pub warnings: Vec<String>,
@@ -133,10 +133,7 @@ impl HandModel {
             return fail("control", format!("the controller refuses it: {error}"), "");
         }
         let joint_names = file.joints.iter().map(|joint| joint.name.clone()).collect();
-        let per_volt = |joint: &JointFile| {
-            let size = joint.torque_per_volt_nm_v as f32;
-            if joint.motor_reversed { -size } else { size }
-        };
+        let per_volt = |joint: &JointFile| joint.torque_per_volt_nm_v as f32;
         let torques_per_volt_nm_v = file.joints.iter().map(per_volt).collect();
         Ok(Self { name: file.name.clone(), hand, joint_names, config, torques_per_volt_nm_v, warnings })
     }

@@ -7,8 +7,9 @@ use blindgrasp::scene::{HandModel, Scene};
 use blindgrasp::wire::{Packet, Record, Request, Sample};
 use blindgrasp::{MAX_FINGERS, MAX_JOINTS};
 use blindgrasp_shared::command::Refusal;
-use blindgrasp_shared::device::{Device, Inputs, Reading};
+use blindgrasp_shared::device::{Device, Inputs};
 use blindgrasp_shared::identity::{Clock, Identity, Image};
+use blindgrasp_shared::joints::Reading;
 use blindgrasp_shared::link::message::{Reply, not_understood};
 use blindgrasp_shared::link::{Receiver, encode, most_bytes};
 use blindgrasp_shared::parameters::Parameter;
@@ -133,16 +134,8 @@ impl Firmware {
             Reading::Failed,
         );
         let asked = packet.clone();
-        let inputs = Inputs {
-            reading,
-            late: sample.late,
-            supply_low: false,
-            cycles: 1234,
-            dropped: 0,
-            waiting: 0,
-            packet,
-        };
-        let outputs = self.device.tick(&inputs, &mut self.burst);
+        let inputs = Inputs { late: sample.late, cycles: 1234, packet, ..Inputs::default() };
+        let outputs = self.device.tick(&reading, &inputs, &mut self.burst);
         let mut record = outputs.record;
         if self.wrong == Wrong::Used {
             record.tick += self.ticks;

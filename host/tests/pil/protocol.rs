@@ -66,6 +66,8 @@ fn a_run_is_that_of_a_simulation() {
         "control.soft_start_s=0.4",
         "control.estimator_bandwidth_hz=70",
         "plant.gravity_m_s2=[0.0, 1.0, -9.0]",
+        "hand.joint.*.encoder_reversed=true",
+        "hand.joint.*.encoder_zero_count=-300",
     ];
     for settings in [&[][..], &others] {
         let scene = scene(settings);

@@ -7,9 +7,10 @@ use blindgrasp::record::mcap::{About, Device as Recorded, Saved, Setting, Stamp,
 use blindgrasp::scene::{HandFile, HandModel};
 use blindgrasp::{MAX_FINGERS, MAX_JOINTS};
 use blindgrasp_shared::command::Command;
-use blindgrasp_shared::device::{Device, Inputs, Reading};
+use blindgrasp_shared::device::{Device, Inputs};
 use blindgrasp_shared::fault::Raised;
 use blindgrasp_shared::identity::{Clock, Identity, Image, ResetCause, UNITS};
+use blindgrasp_shared::joints::Reading;
 use blindgrasp_shared::link::message::{Form, Packet, Reply, Request, Signals};
 use blindgrasp_shared::link::{Receiver, encode, most_bytes};
 use blindgrasp_shared::math::Real;
@@ -207,15 +208,14 @@ impl Session {
             self.writer.sent(self.recorded, self.now(), &payload).unwrap();
         }
         let inputs = Inputs {
-            reading,
             late,
-            supply_low: false,
             cycles: 10_003 + self.tick % 7,
             dropped: self.dropped,
             waiting: (self.waiting)(self.time),
             packet,
+            ..Inputs::default()
         };
-        let mut outputs = self.device.tick(&inputs, &mut self.burst);
+        let mut outputs = self.device.tick(&reading, &inputs, &mut self.burst);
         if let Some(reply) = outputs.reply.take() {
             if let Reply::Identity { session, .. } = reply {
                 self.session = session;

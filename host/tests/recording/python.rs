@@ -153,7 +153,10 @@ fn python_reads_the_same_values() {
         assert_eq!(units("work_j"), "J");
         assert_eq!(units("joints.<joint>.angle_rad"), "rad");
         assert_eq!(units("joints.<joint>.torque_nm"), "N m");
-        assert_eq!(told["metadata"]["interface_version"], blindgrasp_shared::telemetry::INTERFACE_VERSION.to_string());
+        assert_eq!(
+            told["metadata"]["interface_version"],
+            blindgrasp_shared::telemetry::INTERFACE_VERSION.to_string()
+        );
     }
 }
 

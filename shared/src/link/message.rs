@@ -77,6 +77,31 @@ pub enum Request<const J: usize> {
         /// Which.
         baud: u32,
     },
+    /// The joints stand at angle zero: set their zeros so, while the hand is disarmed.
+    Zero {
+        /// Which joint; `None` for all.
+        joint: Option<u8>,
+    },
+    /// What is read with the signs and zeros that were set is right: the hand may be armed.
+    Confirm,
+    /// Save the parameters that differ from the hand's file, while the hand is disarmed.
+    Save,
+    /// Forget what was saved: the hand's file holds again, from now on. While the hand is disarmed.
+    Defaults,
+}
+
+impl<const J: usize> Request<J> {
+    /// Whether it has to wait until a save is over: it would change what is saved, or move the hand meanwhile.
+    pub fn is_to_wait_for_a_save(&self) -> bool {
+        matches!(
+            self,
+            Self::SetParameter { .. }
+                | Self::Zero { .. }
+                | Self::Save
+                | Self::Defaults
+                | Self::Command(Command::Arm)
+        )
+    }
 }
 
 /// Joints over the link.
@@ -252,7 +277,7 @@ impl<'a, const J: usize> Reply<'a, J> {
 
     /// Bytes that suffice for every reply of up to `J` joints.
     pub const MOST_BYTES: usize = {
-        let identity = 6 + Self::NAMES + 55;
+        let identity = 6 + Self::NAMES + 61;
         // Of a burst: with three numbers before it. A snapshot's part is shorter than an identity.
         let record = 9 + Record::<J>::MOST_BYTES;
         1 + if record > identity { record } else { identity }

@@ -6,6 +6,7 @@ use blindgrasp_shared::control::{Chosen, Hold, LawsConfig, PerGain};
 use blindgrasp_shared::estimate::{Encoder, EstimatorConfig};
 use blindgrasp_shared::fault::FaultConfig;
 use blindgrasp_shared::hand::{Fingertip, Hand, Joint, Link};
+use blindgrasp_shared::joints::MotorConfig;
 use blindgrasp_shared::limit::LimitConfig;
 use blindgrasp_shared::math::Real;
 use blindgrasp_shared::supervisor::SupervisorConfig;
@@ -79,6 +80,7 @@ pub(crate) fn config<const J: usize>() -> Config<J> {
     Config {
         period_us: 1000,
         estimator: EstimatorConfig { bandwidth_hz: 100.0, encoders: [encoder; J] },
+        motors: MotorConfig::FORWARD,
         laws: LawsConfig {
             gains: PerGain { grasp: [5.0, 5e-3], ..PerGain::all(0.0) },
             chosen: Chosen::ALL,

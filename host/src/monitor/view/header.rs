@@ -62,8 +62,10 @@ fn state<'a>(model: &'a Model, screen: &Screen<'a>, now: Duration, width: usize)
         let words = format!("no record for {:.1} s", age.as_secs_f64());
         parts.push(Span::styled(words, palette.bad()));
     }
-    if record.events.contains(Event::FallbackClock) {
-        parts.push(Span::styled("fall-back clock", palette.warning()));
+    for event in [Event::FallbackClock, Event::Unconfirmed] {
+        if record.events.contains(event) {
+            parts.push(Span::styled(event.words(), palette.warning()));
+        }
     }
     for (k, (signal, value)) in scalars(record).into_iter().enumerate() {
         // What does not act says nothing, and potentials have a plot.

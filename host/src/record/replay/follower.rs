@@ -43,7 +43,7 @@ pub struct Follower {
     expected: Option<u32>,
     computed: Option<(u32, Vec<u8>)>,
     /// Changes of parameters that were asked for and not answered yet.
-    asked: Vec<(u16, Setting)>,
+    asked: Vec<(u16, Option<Setting>)>,
     /// Whether the parameters are still to be told.
     parameters_due: bool,
     /// The last record that came: its tick and decimation.
@@ -255,10 +255,12 @@ impl Follower {
         self.usable = Usable::FromNext;
     }
 
-    fn ask(&mut self, sequence: u16, setting: Setting) {
+    fn ask(&mut self, sequence: u16, setting: Option<Setting>) {
         let known = self.controller.as_ref();
-        let now = known.and_then(|known| known.recorded.get(setting.parameter, setting.index).ok());
-        if now.map(|now| now.value) != setting.value {
+        let now = known
+            .zip(setting.as_ref())
+            .and_then(|(known, setting)| known.recorded.get(setting.parameter, setting.index).ok());
+        if setting.as_ref().is_none_or(|setting| now.map(|now| now.value) != setting.value) {
             self.asked.push((sequence, setting));
         }
     }
@@ -266,8 +268,8 @@ impl Follower {
     fn answer(&mut self, sequence: u16, refused: Option<Refusal>) -> Result<(), ReplayError> {
         let Some(at) = self.asked.iter().position(|(asked, _)| *asked == sequence) else { return Ok(()) };
         let (_, setting) = self.asked.remove(at);
-        match (refused, &self.controller, &self.model) {
-            (None, Some(controller), Some(model)) => {
+        match (refused, &self.controller, setting.as_ref().zip(self.model.as_ref())) {
+            (None, Some(controller), Some((setting, model))) => {
                 let mut config = controller.config;
                 let put =
                     config.put(model.joint_names.len(), setting.parameter, setting.index, setting.value);
@@ -275,8 +277,8 @@ impl Follower {
                     self.configure(config)?;
                 }
             }
-            // It was taken, or a later one was: what is in force has still to be told.
-            (Some(Refusal::OutOfOrder), ..) => {
+            // It was taken, or a later one was, or it was done by what the device found: what is in force has still to be told.
+            (Some(Refusal::OutOfOrder), ..) | (None, ..) if refused.is_some() || setting.is_none() => {
                 self.parameters_changed();
                 self.parameters_due = true;
             }

@@ -20,8 +20,8 @@ pub enum Item {
     Asked {
         /// Number of the request.
         sequence: u16,
-        /// What it is to be.
-        setting: Setting,
+        /// What it is to be; `None` if the device itself finds out.
+        setting: Option<Setting>,
     },
     /// A request was answered.
     Answered {
@@ -104,6 +104,12 @@ fn heard(time_s: f64, payload: &[u8]) -> Option<Item> {
 /// The change of a parameter that a request asks for.
 fn asked(payload: &[u8]) -> Option<Item> {
     let Packet { sequence, request, .. } = Packet::decode(payload).ok()?;
-    let Request::SetParameter { parameter, index, value } = request else { return None };
-    Some(Item::Asked { sequence, setting: Setting { parameter, index, value: Some(value) } })
+    let setting = match request {
+        Request::SetParameter { parameter, index, value } => {
+            Some(Setting { parameter, index, value: Some(value) })
+        }
+        Request::Zero { .. } | Request::Defaults => None,
+        _ => return None,
+    };
+    Some(Item::Asked { sequence, setting })
 }

@@ -110,12 +110,13 @@ fn signs_zeros_and_scales_come_from_the_file() {
     let encoders = model.config.estimator.encoders;
     let signs_and_zeros = [0, 1, 2].map(|k| (encoders[k].reversed, encoders[k].zero_count));
     assert_eq!(signs_and_zeros, [(true, -7), (false, 9), (false, -7)]);
-    assert_eq!(model.torques_per_volt_nm_v[..3], [0.25, -0.25, 0.25]);
+    assert_eq!(model.config.motors.reversed[..3], [false, true, false]);
+    assert_eq!(model.torques_per_volt_nm_v, [0.25; 12]);
     let bytes = model.bytes();
     assert_eq!(torques_per_volt_nm_v::<12>(&bytes).unwrap()[..], model.torques_per_volt_nm_v);
     assert_eq!(*decode::<MAX_JOINTS, MAX_FINGERS>(&bytes).unwrap().config(), model.config);
     let mut turned = model.clone();
-    turned.torques_per_volt_nm_v[11] = -0.25;
+    turned.config.motors.reversed[11] = true;
     assert_ne!(turned.hash(), model.hash());
     // Unless given: the paper's amplifier, motor and gear.
     let usual = HandModel::load("three-finger").unwrap();
