@@ -165,6 +165,15 @@ mod with_probes {
         large.segments[0].memory_bytes = 1024 * 1024;
         large.segments[1].stored = FLASH + 1024 * 1024;
         refuse(&large.bytes(), &["on STM32F405RGTx", "needs 1048640 bytes of flash", "has 1048576"]);
+        let mut saving = good.clone();
+        for (name, at) in [("_saved_start", FLASH + 0xC_0000), ("_saved_end", FLASH + 0x10_0000)] {
+            saving.symbols.push((name.to_owned(), at, false));
+        }
+        saving.segments[1].stored = FLASH + 0xB_FFFC;
+        refuse(
+            &saving.bytes(),
+            &["reaches into the flash of saved parameters", "to 0x080e0000 would be erased"],
+        );
         let mut hungry = good.clone();
         hungry.segments[2].memory_bytes = 128 * 1024;
         refuse(&hungry.bytes(), &["need 131136 bytes of RAM", "has 131072"]);
@@ -257,6 +266,20 @@ mod with_probes {
         assert!(matches!(chip.check(&firmware), Err(ChipError::Fit(_))));
         assert_eq!(chip.memory().flash, 0x0800_0000..0x0810_0000);
         assert!(chip.memory().ram.contains(&(u64::from(RAM)..u64::from(RAM_END))));
+    }
+
+    #[test]
+    fn the_sectors_that_are_erased_are_known() {
+        let chip = Chip::by_name("STM32F405RGTx").expect("known");
+        let flash: Vec<_> = chip
+            .memory()
+            .sectors
+            .iter()
+            .filter(|sector| chip.memory().flash.contains(&sector.start))
+            .collect();
+        let sizes: Vec<u64> = flash.iter().map(|sector| (sector.end - sector.start) / 1024).collect();
+        assert_eq!(sizes, [16, 16, 16, 16, 64, 128, 128, 128, 128, 128, 128, 128]);
+        assert_eq!((flash[0].start, flash[11].end), (0x0800_0000, 0x0810_0000));
     }
 
     #[test]

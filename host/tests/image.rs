@@ -9,10 +9,17 @@ use blindgrasp_shared::identity::Image;
 use blindgrasp_shared::telemetry::INTERFACE_VERSION;
 use elf::{Elf, FLASH, RAM, RAM_END, RESET, Segment, identity, image};
 
-/// The memory of an STM32F405RG: 1 MiB of flash, 64 KiB of RAM beside the core, 112 + 16 KiB of RAM.
-fn stm32f405() -> Memory {
+/// Memory as a chip may have it: 1 MiB of flash in sectors of 16, 64 and 128 KiB, 64 KiB of RAM beside the core,
+/// 112 + 16 KiB of RAM.
+fn memory() -> Memory {
+    let sizes = [16, 16, 16, 16, 64, 128, 128, 128, 128, 128, 128, 128];
+    let sectors = sizes.iter().scan(0x0800_0000, |end, kib| {
+        let begin = *end;
+        *end += kib * 1024;
+        Some(begin..*end)
+    });
     let ram = vec![0x2001_C000..0x2002_0000, 0x1000_0000..0x1001_0000, 0x2000_0000..0x2001_C000];
-    Memory::new(0x0800_0000..0x0810_0000, ram)
+    Memory::new(0x0800_0000..0x0810_0000, sectors.collect(), ram)
 }
 
 fn refusal(elf: &Elf) -> ImageError {
@@ -21,7 +28,7 @@ fn refusal(elf: &Elf) -> ImageError {
 
 fn misfit(elf: &Elf) -> FitError {
     let file = elf.bytes();
-    Firmware::parse(&file).expect("an image").footprint(&stm32f405()).expect_err("refused")
+    Firmware::parse(&file).expect("an image").footprint(&memory()).expect_err("refused")
 }
 
 fn purpose(image: &Image<'_>, hand: Option<&ExpectedHand>) -> Result<(), PurposeError> {
@@ -39,7 +46,7 @@ fn a_good_image_is_understood() {
     let code = elf.segments[0].bytes.len() as u64;
     let stored: Vec<_> = firmware.stored().map(|(address, bytes)| (address, bytes.len() as u64)).collect();
     assert_eq!(stored, [(u64::from(FLASH), code), (u64::from(FLASH) + code, 64)]);
-    let footprint = firmware.footprint(&stm32f405()).expect("it fits");
+    let footprint = firmware.footprint(&memory()).expect("it fits");
     let expected = Footprint {
         flash_used_bytes: code + 64,
         flash_bytes: 1024 * 1024,
@@ -53,9 +60,63 @@ fn a_good_image_is_understood() {
     assert_eq!(footprint, expected);
 }
 
+/// An image that keeps a range of flash for saved parameters, with its second segment stored somewhere.
+fn saving([start, end]: [u32; 2], stored: u32) -> Elf {
+    let mut elf = Elf::good(&image());
+    elf.symbols.push(("_saved_start".to_owned(), start, false));
+    elf.symbols.push(("_saved_end".to_owned(), end, false));
+    elf.segments[1].stored = stored;
+    elf
+}
+
+#[test]
+fn an_image_that_reaches_into_saved_parameters_is_refused() {
+    const BEGIN: u32 = FLASH + 0xC_0000;
+    const END: u32 = FLASH + 0x10_0000;
+    let length = Elf::good(&image()).segments[1].bytes.len() as u32;
+    let footprint = |elf: &Elf| {
+        let file = elf.bytes();
+        Firmware::parse(&file).expect("an image").footprint(&memory())
+    };
+    let fits = footprint(&saving([BEGIN, END], BEGIN - length)).expect("it ends before them");
+    assert_eq!(fits.flash_bytes, 768 * 1024);
+    for stored in [BEGIN - length + 1, BEGIN, END - length] {
+        let error = misfit(&saving([BEGIN, END], stored));
+        let FitError::ReachesSaved { saved, .. } = &error else { panic!("{error}") };
+        assert_eq!(*saved, u64::from(BEGIN)..u64::from(END));
+        let text = error.to_string();
+        for words in ["0x080c0000 to 0x08100000", "_saved_start", "make the image smaller"] {
+            assert!(text.contains(words), "no `{words}` in: {text}");
+        }
+    }
+    // Not in them, but in the sector that they begin in.
+    let error = misfit(&saving([BEGIN + 0x1000, END], BEGIN));
+    let expected = FitError::ReachesSaved {
+        stored: u64::from(BEGIN)..u64::from(BEGIN + length),
+        erased: u64::from(BEGIN)..u64::from(BEGIN) + 128 * 1024,
+        saved: u64::from(BEGIN + 0x1000)..u64::from(END),
+    };
+    assert_eq!(error, expected);
+    // An image without the symbols has none, and may be stored anywhere.
+    let mut none = saving([BEGIN, END], BEGIN);
+    none.symbols.truncate(1);
+    assert_eq!(footprint(&none).expect("there are none").flash_bytes, 1024 * 1024);
+}
+
+#[test]
+fn parameters_that_the_chip_has_no_flash_for_are_refused() {
+    for saved in
+        [[FLASH + 0xF_0000, FLASH + 0x11_0000], [RAM, RAM + 4096], [FLASH + 0xE_0000, FLASH + 0xC_0000]]
+    {
+        let error = misfit(&saving(saved, FLASH + 0x1_0000));
+        assert!(matches!(error, FitError::SavedNotInFlash { .. }), "{error}");
+        assert!(error.to_string().contains("check memory.x and --chip"), "{error}");
+    }
+}
+
 #[test]
 fn memory_that_touches_is_one() {
-    assert_eq!(stm32f405().ram, [0x1000_0000..0x1001_0000, 0x2000_0000..0x2002_0000]);
+    assert_eq!(memory().ram, [0x1000_0000..0x1001_0000, 0x2000_0000..0x2002_0000]);
 }
 
 #[test]
@@ -88,7 +149,7 @@ fn a_file_with_random_damage_is_judged_without_a_panic() {
         }
         let judged = Firmware::parse(&file).is_ok_and(|firmware| {
             let _ = firmware.check_purpose(Kind::Hand, None);
-            firmware.footprint(&stm32f405()).is_ok()
+            firmware.footprint(&memory()).is_ok()
         });
         *if judged { &mut accepted } else { &mut refused } += 1;
     }
@@ -207,7 +268,7 @@ fn flash_is_filled_to_the_last_byte_and_no_further() {
         elf
     };
     let file = filled(1024 * 1024).bytes();
-    let footprint = Firmware::parse(&file).expect("an image").footprint(&stm32f405()).expect("it fits");
+    let footprint = Firmware::parse(&file).expect("an image").footprint(&memory()).expect("it fits");
     assert_eq!(footprint.flash_used_bytes, footprint.flash_bytes);
     let error = FitError::FlashTooSmall { needed_bytes: 1024 * 1024 + 4, available_bytes: 1024 * 1024 };
     assert_eq!(misfit(&filled(1024 * 1024 + 4)), error);
@@ -242,7 +303,7 @@ fn variables_must_fit_and_leave_a_stack() {
     // Up to what the stack must have.
     let room = 124 * 1024 - LEAST_STACK_BYTES as u32;
     let file = with(RAM + 4096, room).bytes();
-    let footprint = Firmware::parse(&file).expect("an image").footprint(&stm32f405()).expect("it fits");
+    let footprint = Firmware::parse(&file).expect("an image").footprint(&memory()).expect("it fits");
     assert_eq!(footprint.stack_bytes, LEAST_STACK_BYTES);
     let stack_pointer = u64::from(RAM_END);
     let error = FitError::NoRoomForStack { room_bytes: LEAST_STACK_BYTES - 8, stack_pointer };
@@ -259,7 +320,7 @@ fn a_stack_below_the_variables_is_understood() {
     elf.segments[1].used = RAM_END - 4096;
     elf.segments[2].used = RAM_END - 4096 + 64;
     let file = elf.bytes();
-    let footprint = Firmware::parse(&file).expect("an image").footprint(&stm32f405()).expect("it fits");
+    let footprint = Firmware::parse(&file).expect("an image").footprint(&memory()).expect("it fits");
     assert_eq!((footprint.ram_used_bytes, footprint.stack_bytes), (4096, 124 * 1024));
     // Nothing below it.
     let elf = Elf::good(&image()).with_word(0, RAM);

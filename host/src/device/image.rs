@@ -27,6 +27,9 @@ pub struct Firmware<'a> {
     pub segments: Vec<Segment<'a>>,
     /// Address of the control block of SEGGER's Real-Time Transfer, through which it logs.
     pub rtt_control_block: Option<u64>,
+    /// Flash where it keeps what outlives flashing, saved parameters, by the symbols `_saved_start` and `_saved_end` of its
+    /// `memory.x`.
+    pub saved: Option<Range<u64>>,
 }
 
 /// A piece of memory that a firmware occupies.
@@ -61,11 +64,13 @@ pub struct Memory {
     pub flash: Range<u64>,
     /// RAM, in order; no two ranges touch.
     pub ram: Vec<Range<u64>>,
+    /// Sectors of the flash: what is written to one erases all of it.
+    pub sectors: Vec<Range<u64>>,
 }
 
 impl Memory {
     /// Ranges of RAM that touch become one.
-    pub fn new(flash: Range<u64>, mut ram: Vec<Range<u64>>) -> Self {
+    pub fn new(flash: Range<u64>, sectors: Vec<Range<u64>>, mut ram: Vec<Range<u64>>) -> Self {
         ram.sort_by_key(|range| range.start);
         let mut merged: Vec<Range<u64>> = Vec::with_capacity(ram.len());
         for range in ram {
@@ -74,7 +79,13 @@ impl Memory {
                 _ => merged.push(range),
             }
         }
-        Self { flash, ram: merged }
+        Self { flash, ram: merged, sectors }
+    }
+
+    /// What is erased before something is stored: its sectors.
+    fn erased(&self, stored: &Range<u64>) -> Range<u64> {
+        let touched = self.sectors.iter().filter(|sector| overlap(sector, stored));
+        touched.fold(stored.clone(), |all, sector| all.start.min(sector.start)..all.end.max(sector.end))
     }
 
     fn ram_with(&self, address: u64) -> Option<&Range<u64>> {
@@ -87,7 +98,7 @@ impl Memory {
 pub struct Footprint {
     /// Bytes that are stored in flash.
     pub flash_used_bytes: u64,
-    /// Bytes of flash.
+    /// Bytes of flash, without what is kept for saved parameters.
     pub flash_bytes: u64,
     /// Bytes of variables, without the stack.
     pub ram_used_bytes: u64,
@@ -212,6 +223,32 @@ pub enum FitError {
         needed_bytes: u64,
         /// What there is.
         available_bytes: u64,
+    },
+    /// Saved parameters would be lost.
+    #[error(
+        "the image reaches into the flash of saved parameters, {:#010x} to {:#010x} by its symbols _saved_start and \
+        _saved_end: to store {} bytes at {:#010x}, {:#010x} to {:#010x} would be erased; make the image smaller, or check \
+        memory.x",
+        .saved.start, .saved.end, .stored.end - .stored.start, .stored.start, .erased.start, .erased.end
+    )]
+    ReachesSaved {
+        /// What would be stored.
+        stored: Range<u64>,
+        /// The sectors of that.
+        erased: Range<u64>,
+        /// Where parameters are saved.
+        saved: Range<u64>,
+    },
+    /// Parameters would be saved where the chip keeps nothing.
+    #[error(
+        "the image saves parameters at {:#010x} to {:#010x}, which is not in this chip's flash ({:#010x} to {:#010x}); \
+        check memory.x and --chip", .saved.start, .saved.end, .flash.start, .flash.end
+    )]
+    SavedNotInFlash {
+        /// Where parameters are saved.
+        saved: Range<u64>,
+        /// The chip's flash.
+        flash: Range<u64>,
     },
     /// Variables are where the chip has no memory.
     #[error("variables are at {address:#010x}, where this chip has no RAM; check memory.x and --chip")]
@@ -350,11 +387,12 @@ impl<'a> Firmware<'a> {
         }
         let segments = segments(&parsed, file)?;
         let image = identity(&segments)?;
-        let rtt_control_block = parsed
-            .symbols()
-            .find(|symbol| !symbol.is_undefined() && symbol.name() == Ok("_SEGGER_RTT"))
-            .map(|symbol| symbol.address());
-        Ok(Self { image, segments, rtt_control_block })
+        let symbol = |name| {
+            let mut symbols = parsed.symbols();
+            symbols.find(|symbol| !symbol.is_undefined() && symbol.name() == Ok(name)).map(|s| s.address())
+        };
+        let saved = symbol("_saved_start").zip(symbol("_saved_end")).map(|(start, end)| start..end);
+        Ok(Self { image, segments, rtt_control_block: symbol("_SEGGER_RTT"), saved })
     }
 
     /// What is stored in flash: address and bytes.
@@ -399,6 +437,7 @@ impl<'a> Firmware<'a> {
         for segment in &self.segments {
             check_stored(segment, &memory.flash)?;
         }
+        let saved_bytes = self.saved_bytes(memory)?;
         let variables = self.variables(memory)?;
         let (stack_pointer, reset_address) = self.vectors(memory)?;
         let stack_bytes = stack_room(stack_pointer, memory, &variables)?;
@@ -407,13 +446,29 @@ impl<'a> Firmware<'a> {
         };
         Ok(Footprint {
             flash_used_bytes: self.stored().map(|(_, bytes)| bytes.len() as u64).sum(),
-            flash_bytes: memory.flash.end - memory.flash.start,
+            flash_bytes: memory.flash.end - memory.flash.start - saved_bytes,
             ram_used_bytes: variables.iter().map(|used| used.end - used.start).sum(),
             ram_bytes: memory.ram.iter().filter(in_use).map(|ram| ram.end - ram.start).sum(),
             stack_bytes,
             stack_pointer,
             reset_address,
         })
+    }
+
+    /// Bytes of flash for saved parameters, of which storing the image erases none.
+    fn saved_bytes(&self, memory: &Memory) -> Result<u64, FitError> {
+        let Some(saved) = self.saved.clone() else { return Ok(0) };
+        let flash = memory.flash.clone();
+        if !(flash.start <= saved.start && saved.start <= saved.end && saved.end <= flash.end) {
+            return Err(FitError::SavedNotInFlash { saved, flash });
+        }
+        for segment in self.segments.iter().filter(|segment| !segment.bytes.is_empty()) {
+            let (stored, erased) = (segment.stored(), memory.erased(&segment.stored()));
+            if overlap(&erased, &saved) {
+                return Err(FitError::ReachesSaved { stored, erased, saved });
+            }
+        }
+        Ok(saved.end - saved.start)
     }
 
     /// Where variables are, each range within one RAM.
@@ -457,6 +512,10 @@ impl<'a> Firmware<'a> {
         }
         Ok((stack_pointer, address))
     }
+}
+
+fn overlap(one: &Range<u64>, other: &Range<u64>) -> bool {
+    one.start < other.end && other.start < one.end
 }
 
 fn damaged(error: impl fmt::Display) -> ImageError {

@@ -1,9 +1,10 @@
 //! What probe-rs knows of a chip.
 
 use crate::device::image::{Firmware, FitError, Footprint, Memory};
-use probe_rs::config::{MemoryRegion, Registry, RegistryError};
+use probe_rs::config::{FlashProperties, MemoryRegion, Registry, RegistryError, SectorDescription};
 use probe_rs::flashing::{FlashError, FlashLoader};
 use probe_rs::{Architecture, Target};
+use std::ops::Range;
 
 /// How many names are suggested in place of an unknown one.
 const SUGGESTIONS: usize = 8;
@@ -138,7 +139,20 @@ fn memory(target: &Target) -> Option<Memory> {
     {
         flash.end = next.range.end;
     }
+    let sectors = target.flash_algorithms.iter().flat_map(|algorithm| sectors(&algorithm.flash_properties));
     let ram = target.memory_map.iter().filter_map(MemoryRegion::as_ram_region);
     let ram = ram.filter(|region| !region.is_alias).map(|region| region.range.clone()).collect();
-    Some(Memory::new(flash, ram))
+    Some(Memory::new(flash, sectors.collect(), ram))
+}
+
+/// The sectors that an algorithm erases. They are described by where the first of each size is, from the start on.
+fn sectors(flash: &FlashProperties) -> Vec<Range<u64>> {
+    let Range { start, end } = flash.address_range;
+    let firsts = &flash.sectors;
+    let ends = firsts.iter().skip(1).map(|next| start + next.address).chain([end]);
+    let alike = |(first, end): (&SectorDescription, u64)| {
+        let begins = (start + first.address..end).step_by(first.size.max(1) as usize);
+        begins.map(|begin| begin..begin + first.size).collect::<Vec<_>>()
+    };
+    firsts.iter().zip(ends).flat_map(alike).collect()
 }

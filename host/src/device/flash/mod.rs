@@ -57,8 +57,8 @@ pub enum DownloadError {
     Failed(#[source] probe_rs::flashing::FlashError),
 }
 
-/// Writes an image to the flash of a connected chip. Sectors that it does not touch stay as they are. The chip is
-/// left halted.
+/// Writes an image to the flash of a connected chip. Sectors that it does not touch stay as they are, those of saved
+/// parameters among them ([`FitError::ReachesSaved`](super::image::FitError::ReachesSaved)). The chip is left halted.
 ///
 /// # Errors
 /// If the image does not fit, or the chip or the probe fail.
@@ -74,6 +74,8 @@ pub fn download(
     let mut done = [0_u64; 3];
     let mut options = DownloadOptions::default();
     options.verify = verify;
+    // It would take what is saved.
+    options.do_chip_erase = false;
     options.progress = FlashProgress::new(|event| {
         let operation = match event {
             ProgressEvent::AddProgressBar { operation, total } => {
