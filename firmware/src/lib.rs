@@ -34,6 +34,8 @@ pub mod bench;
 pub mod crash;
 #[cfg(all(target_os = "none", not(feature = "no-panic")))]
 pub mod report;
+#[cfg(all(target_os = "none", not(feature = "no-panic")))]
+pub mod saved;
 #[cfg(target_os = "none")]
 pub mod schedule;
 #[cfg(target_os = "none")]

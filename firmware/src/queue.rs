@@ -187,11 +187,11 @@ pub struct StoreEnd<'q> {
 }
 
 impl StoreEnd<'_> {
-    /// Does what the control task has told the store, if there is one.
-    pub fn poll<S: NorFlash>(&mut self, store: &mut Option<Store<S>>, hand_hash: u32) {
-        if let (Some(store), Some(order)) = (store, dequeue(&mut self.orders)) {
+    /// Does what the control task has told the store of a hand with this hash, if there is one.
+    pub fn poll<S: NorFlash>(&mut self, store: &mut Option<(Store<S>, u32)>) {
+        if let (Some((store, hand_hash)), Some(order)) = (store, dequeue(&mut self.orders)) {
             // There is room, so this can't fail.
-            let _ = enqueue(&mut self.stored, store.obey(&order, hand_hash));
+            let _ = enqueue(&mut self.stored, store.obey(&order, *hand_hash));
         }
     }
 }

@@ -14,9 +14,11 @@ mod app {
     use blindgrasp_firmware::control::{Control, HandBurst, Timing, task};
     use blindgrasp_firmware::link::Link;
     use blindgrasp_firmware::model::IMAGE_HAND;
-    use blindgrasp_firmware::queue::{ControlEnd, Queues};
+    use blindgrasp_firmware::queue::{ControlEnd, Queues, StoreEnd};
     use blindgrasp_firmware::report::{self, LineReport};
-    use blindgrasp_firmware::schedule;
+    use blindgrasp_firmware::{saved, schedule};
+    use blindgrasp_shared::store::Store;
+    use core::mem::MaybeUninit;
 
     #[shared]
     struct Shared {}
@@ -27,31 +29,41 @@ mod app {
         /// On hardware.
         receiving: Option<Receiving>,
         sending: Option<Sending>,
-        control: Control,
+        control: &'static mut Control,
         joints: HandJoints,
         queues: ControlEnd<'static>,
         last: Timing,
         /// On hardware.
         watchdog: Option<board::Watchdog>,
         link: Link<'static, Line>,
+        /// On hardware, with the hash of the hand.
+        store: Option<(Store<board::SavedFlash>, u32)>,
+        store_end: StoreEnd<'static>,
     }
 
-    #[init(local = [all_queues: Queues = Queues::new(), buses: Buses = Buses::new(), burst: HandBurst = HandBurst::new()])]
+    #[init(local = [all_queues: Queues = Queues::new(), buses: Buses = Buses::new(), burst: HandBurst = HandBurst::new(), place: MaybeUninit<Control> = MaybeUninit::uninit()])]
     fn init(mut cx: init::Context) -> (Shared, Local) {
         let device = cx.device;
         supply::start(&device.PWR, &device.EXTI, &device.RCC);
-        let mut boot = Boot::new(device.RCC, &device.DBGMCU, &device.FLASH);
+        let mut boot = Boot::new(device.RCC, &device.DBGMCU, device.FLASH);
         report::start(&boot, &IMAGE_HAND);
+        let (line_pins, joint_pins) = board::pins(device.GPIOA, device.GPIOB, device.GPIOC, &mut boot.rcc);
+        // The outputs are off: the pins have just become some.
+        let (flash, mut store) = (boot.flash.take(), None);
+        let restore = |hash, params: &mut _| {
+            let (found, restored) = saved::restore(flash?, hash, params)?;
+            store = Some((found, hash));
+            Some(restored)
+        };
+        let control = boot.control(&IMAGE_HAND, restore, cx.local.burst, cx.local.place);
         let dma = (!boot.is_emulated()).then_some(device.DMA1);
         let rcc = &mut boot.rcc;
-        let (line_pins, joint_pins) = board::pins(device.GPIOA, device.GPIOB, device.GPIOC, rcc);
         let joints = board::joints(device.SPI1, device.SPI2, joint_pins, cx.local.buses, rcc);
         let (interrupt, line, streams) = serial::start(device.USART2, dma, line_pins, rcc)
             .expect("the board's baud rate can be had from its clock");
         let (receiving, sending) = streams.unzip();
-        let (queues, link_end, _) = cx.local.all_queues.split();
-        let controller = boot.device(&IMAGE_HAND);
-        let period_us = controller.params().config().period_us;
+        let (queues, link_end, store_end) = cx.local.all_queues.split();
+        let period_us = control.device().params().config().period_us;
 
         let watchdog = (!boot.is_emulated()).then(|| board::watchdog(device.IWDG, &device.DBGMCU));
         schedule::start_cycle_counter(&mut cx.core.DCB, &mut cx.core.DWT);
@@ -60,12 +72,14 @@ mod app {
             interrupt,
             receiving,
             sending,
-            control: Control::new(controller, cx.local.burst),
+            control,
             joints,
             queues,
             last: Timing::default(),
             watchdog,
             link: Link::new(line, link_end),
+            store,
+            store_end,
         };
         (Shared {}, local)
     }
@@ -121,12 +135,13 @@ mod app {
         }
     }
 
-    /// All that has time: frames, and logs.
-    #[idle(local = [link, report: LineReport = LineReport::new()])]
+    /// All that has time: frames, what is saved, and logs.
+    #[idle(local = [link, store, store_end, report: LineReport = LineReport::new()])]
     fn idle(cx: idle::Context) -> ! {
-        let idle::LocalResources { link, report, .. } = cx.local;
+        let idle::LocalResources { link, store, store_end, report, .. } = cx.local;
         loop {
             link.poll(schedule::ticks());
+            store_end.poll(store);
             report.poll(link.counters());
             // Without interrupts, so that one that comes after the look is not slept through: it ends the sleep, and is
             // served after it.

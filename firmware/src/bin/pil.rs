@@ -24,6 +24,7 @@ mod app {
     use blindgrasp_firmware::pil::{Lockstep, Way};
     use blindgrasp_firmware::semihosting::{self, Access, File};
     use blindgrasp_firmware::{bench, board, report, schedule};
+    use core::mem::MaybeUninit;
     use cortex_m::peripheral::SYST;
 
     #[shared]
@@ -33,15 +34,15 @@ mod app {
     struct Local {
         interrupt: Interrupt,
         line: Line,
-        control: Control,
+        control: &'static mut Control,
         timer: SYST,
         is_emulated: bool,
     }
 
-    #[init(local = [burst: HandBurst = HandBurst::new()])]
+    #[init(local = [burst: HandBurst = HandBurst::new(), place: MaybeUninit<Control> = MaybeUninit::uninit()])]
     fn init(mut cx: init::Context) -> (Shared, Local) {
         let device = cx.device;
-        let mut boot = Boot::new(device.RCC, &device.DBGMCU, &device.FLASH);
+        let mut boot = Boot::new(device.RCC, &device.DBGMCU, device.FLASH);
         report::start(&boot, &IMAGE_PIL);
         let rcc = &mut boot.rcc;
         let (line_pins, _) = board::pins(device.GPIOA, device.GPIOB, device.GPIOC, rcc);
@@ -49,9 +50,8 @@ mod app {
         let (interrupt, line, _) = serial::start(device.USART2, None, line_pins, rcc)
             .expect("the board's baud rate can be had from its clock");
         schedule::start_cycle_counter(&mut cx.core.DCB, &mut cx.core.DWT);
-        let (control, is_emulated) =
-            (Control::new(boot.device(&IMAGE_PIL), cx.local.burst), boot.is_emulated());
-        (Shared {}, Local { interrupt, line, control, timer: cx.core.SYST, is_emulated })
+        let control = boot.control(&IMAGE_PIL, |_, _| None, cx.local.burst, cx.local.place);
+        (Shared {}, Local { interrupt, line, control, timer: cx.core.SYST, is_emulated: boot.is_emulated() })
     }
 
     /// A byte from the line.

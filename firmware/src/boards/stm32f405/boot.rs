@@ -1,14 +1,18 @@
 //! The start that both images share: clock, and why there was a reset.
 
+use super::SavedFlash;
+use super::flash::{Flash, Mapped};
 use super::{clock, reset, wiring};
-use crate::{crash, model};
+use crate::control::{Control, HandBurst};
+use crate::crash;
+use crate::model::{self, FINGERS, JOINTS};
 use blindgrasp_shared::device::Device;
-use blindgrasp_shared::identity::{BrownOut, Clock, Crash, Identity, Image, ResetCause};
+use blindgrasp_shared::identity::{BrownOut, Clock, Crash, Identity, Image, ResetCause, Restored};
 use blindgrasp_shared::link::rate::FASTER_BAUDS;
+use blindgrasp_shared::tick::Params;
+use core::mem::MaybeUninit;
 use stm32f4xx_hal::pac::{DBGMCU, FLASH, RCC};
 use stm32f4xx_hal::rcc::Rcc;
-
-use crate::model::{FINGERS, JOINTS};
 
 /// What the start found.
 pub struct Boot {
@@ -22,11 +26,13 @@ pub struct Boot {
     pub crash: Option<Crash>,
     /// Level of the brown-out reset.
     pub brown_out: BrownOut,
+    /// Flash for saved parameters; not in QEMU, which has no controller for it.
+    pub flash: Option<SavedFlash>,
 }
 
 impl Boot {
     /// Finds out why there was a reset, and starts the clock.
-    pub fn new(rcc: RCC, debug: &DBGMCU, flash: &FLASH) -> Self {
+    pub fn new(rcc: RCC, debug: &DBGMCU, flash: FLASH) -> Self {
         let reset = reset::cause(rcc.csr().read().bits());
         // The flags add up over resets until they are cleared.
         rcc.csr().modify(|_, w| w.rmvf().clear());
@@ -37,7 +43,8 @@ impl Boot {
             Clock::Emulated => BrownOut::Unknown,
             Clock::External | Clock::Fallback => reset::brown_out(flash.optcr().read().bits()),
         };
-        Self { rcc, clock, reset, crash: crash::take(), brown_out }
+        let flash = (clock != Clock::Emulated).then(|| Flash::new(Mapped(flash)));
+        Self { rcc, clock, reset, crash: crash::take(), brown_out, flash }
     }
 
     /// Whether this is QEMU.
@@ -45,12 +52,36 @@ impl Boot {
         self.clock == Clock::Emulated
     }
 
-    /// The hand, as the image's description calls it.
+    /// The control task's hand, as the image's description calls it, in a place of its own. `restore`, which is
+    /// told the hash of the hand, may put saved parameters in the place of its file's; tells what became of them, if there is a store.
+    ///
+    /// Here the stack is deepest: hence no part of it is in the caller's frame, nor the hand in that of its parameters.
     ///
     /// # Panics
     /// Never: the build wrote the description.
-    pub fn device(&self, image: &'static [u8]) -> Device<JOINTS, FINGERS> {
+    #[inline(never)]
+    pub fn control(
+        &self,
+        image: &'static [u8],
+        restore: impl FnOnce(u32, &mut Params<JOINTS, FINGERS>) -> Option<Restored>,
+        burst: &'static mut HandBurst,
+        place: &'static mut MaybeUninit<Control>,
+    ) -> &'static mut Control {
+        let mut params = model::params();
         let image = Image::decode(image).expect("the build wrote the description");
+        let restored = restore(image.hand_hash, &mut params);
+        self.place(image, params, restored, burst, place)
+    }
+
+    #[inline(never)]
+    fn place(
+        &self,
+        image: Image<'static>,
+        params: Params<JOINTS, FINGERS>,
+        restored: Option<Restored>,
+        burst: &'static mut HandBurst,
+        place: &'static mut MaybeUninit<Control>,
+    ) -> &'static mut Control {
         let &Self { clock, reset, crash, brown_out, .. } = self;
         let clock_hz = if self.is_emulated() { 0 } else { wiring::SYSTEM_CLOCK.raw() };
         // An emulated line has no rate, and without the crystal only the slowest is sure.
@@ -63,6 +94,11 @@ impl Boot {
             most_baud: faster_bauds.iter().copied().fold(wiring::BAUD, u32::max),
             ..Identity::of(image, clock)
         };
-        Device::new(model::params(), told).with_faster_bauds(faster_bauds)
+        let device = Device::new(params, told).with_faster_bauds(faster_bauds);
+        let device = match restored {
+            Some(restored) => device.with_store(restored),
+            None => device,
+        };
+        place.write(Control::new(device, burst))
     }
 }

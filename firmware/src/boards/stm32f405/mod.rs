@@ -2,6 +2,7 @@
 //!
 //! On the host only the parts without hardware are there, for their tests.
 
+pub mod flash;
 pub mod reset;
 
 #[cfg(target_os = "none")]
@@ -23,3 +24,7 @@ pub mod wiring;
 pub use stm32f4xx_hal::pac;
 #[cfg(target_os = "none")]
 pub use wiring::*;
+
+/// Flash for saved parameters.
+#[cfg(target_os = "none")]
+pub type SavedFlash = flash::Flash<flash::Mapped>;
