@@ -416,7 +416,7 @@ IDENTITY = Struct(
     clock_hz=U32,
     most_baud=U32,
     changed=Unsigned(64),
-    restored=Struct(saved=U16, ignored=U16),
+    restored=Option(Struct(saved=U16, ignored=U16)),
 )
 REPLY = Enum(
     Identity=Struct(sequence=U16, session=U16, identity=IDENTITY, ends_another=BOOL),

@@ -44,8 +44,8 @@ pub struct Firmware {
     pub clock_hz: u32,
     /// The parameters that differ from the hand's file.
     pub changed: Vec<Parameter>,
-    /// What became at its start of the parameters that were saved.
-    pub restored: Restored,
+    /// What became at its start of the parameters that were saved; `None` where there is nothing to save to.
+    pub restored: Option<Restored>,
 }
 
 impl From<&Identity<'_>> for Firmware {

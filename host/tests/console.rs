@@ -86,12 +86,8 @@ impl Board {
             store.prepare().expect("there is power");
             store.restore(hand.hash(), &mut params, |_| {})
         });
-        let device = Device::new(params, identity);
         Self {
-            device: match restored {
-                Some(restored) => device.with_store(restored),
-                None => device,
-            },
+            device: Device::new(params, Identity { restored, ..identity }),
             burst: Box::new(Burst::new()),
             receiver: Receiver::new(),
             waiting: VecDeque::new(),

@@ -7,7 +7,7 @@
 use crate::command::{self, Command, Refusal};
 use crate::event::{Event, Events};
 use crate::fault::Raised;
-use crate::identity::{Clock, Identity, Restored};
+use crate::identity::{Clock, Identity};
 use crate::joints::{Joints, Reading};
 use crate::link::message::{Form, Packet, Reply, Request, Signals};
 use crate::link::rate::FIRST_BAUD;
@@ -72,8 +72,6 @@ pub struct Device<const J: usize, const F: usize> {
     snapshot: Outgoing<J>,
     /// Rates that its line has besides the first.
     faster_bauds: &'static [u32],
-    /// Whether there is something to save to.
-    has_store: bool,
     saving: Option<Save>,
     /// The answer to a save that is over, until a tick has no other.
     saved: Option<Reply<'static, J>>,
@@ -94,7 +92,6 @@ impl<const J: usize, const F: usize> Device<J, F> {
             telemetry: Telemetry::OFF,
             snapshot: Outgoing::new(),
             faster_bauds: &[],
-            has_store: false,
             saving: None,
             saved: None,
             is_confirmed: true,
@@ -106,12 +103,6 @@ impl<const J: usize, const F: usize> Device<J, F> {
     #[must_use]
     pub fn with_faster_bauds(self, faster_bauds: &'static [u32]) -> Self {
         Self { faster_bauds, ..self }
-    }
-
-    /// The same with something to save parameters to, from which its own come, as was found at the start.
-    #[must_use]
-    pub fn with_store(self, restored: Restored) -> Self {
-        Self { has_store: true, identity: Identity { restored, ..self.identity }, ..self }
     }
 
     /// The parameters.
@@ -209,6 +200,12 @@ impl<const J: usize, const F: usize> Device<J, F> {
 
     /// Goes on with a save, if there is one, once the store has done what it was told before.
     fn save(&mut self, stored: Option<Result<(), StoreError>>) -> Option<Order> {
+        if self.saving.is_some() { self.go_on(stored) } else { None }
+    }
+
+    #[cold]
+    #[inline(never)]
+    fn go_on(&mut self, stored: Option<Result<(), StoreError>>) -> Option<Order> {
         let save = self.saving.as_mut()?;
         if save.is_waiting {
             let done = stored?;
@@ -242,7 +239,7 @@ impl<const J: usize, const F: usize> Device<J, F> {
 
     /// Begins a save, or says why not.
     fn begin_save(&mut self, sequence: u16, forgets: bool) -> Option<Refusal> {
-        if !self.has_store {
+        if self.identity.restored.is_none() {
             return Some(Refusal::NoStore);
         }
         if self.state.mode() != Mode::Disarmed {
@@ -285,6 +282,7 @@ impl<const J: usize, const F: usize> Device<J, F> {
     }
 
     /// What becomes of a request before the tick.
+    #[inline(never)]
     fn ask(&mut self, packet: &Packet<J>, reading: &Reading<J>, burst: &Burst<J>) -> Asked<J> {
         let sequence = packet.sequence;
         let answer = |refused| Asked::Answered(Reply::Answer { sequence, refused });

@@ -98,8 +98,8 @@ pub struct Identity<'a> {
     /// The parameters that differ from the hand's file: a bit for each, by its
     /// [number](crate::parameters::Parameter::number).
     pub changed: u64,
-    /// What became at the start of the parameters that were saved.
-    pub restored: Restored,
+    /// What became at the start of the parameters that were saved; `None` where there is nothing to save to.
+    pub restored: Option<Restored>,
 }
 
 impl<'a> Identity<'a> {
@@ -115,7 +115,7 @@ impl<'a> Identity<'a> {
             clock_hz: 0,
             most_baud: 0,
             changed: 0,
-            restored: Restored { saved: 0, ignored: 0 },
+            restored: None,
         }
     }
 }

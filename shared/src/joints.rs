@@ -3,7 +3,7 @@
 //! A driver is a [`Joints`]; the controller around it is [`Device::turn`](crate::device::Device::turn). What belongs to the
 //! joint and not to its driver is the controller's: sign and zero of its reading, and the sign of its motor.
 
-use crate::estimate::EstimatorConfig;
+use crate::estimate::{Encoder, EstimatorConfig};
 use crate::fault::Raised;
 
 /// A reading of all joints.
@@ -70,12 +70,7 @@ impl<const J: usize> EstimatorConfig<J> {
     /// Returns the angles and speeds of the joints, by those that their drives measure, rad and rad/s.
     pub(crate) fn motion(&self, angles_rad: &[f32; J], speeds_rad_s: &[f32; J]) -> ([f32; J], [f32; J]) {
         let mut motion = (*angles_rad, *speeds_rad_s);
-        for ((angle_rad, speed_rad_s), encoder) in motion.0.iter_mut().zip(&mut motion.1).zip(&self.encoders)
-        {
-            let zero_rad = encoder.zero_count as f32 * encoder.rad_per_count;
-            *angle_rad = encoder.sign() * (*angle_rad - zero_rad);
-            *speed_rad_s *= encoder.sign();
-        }
+        apply(&self.encoders, &mut motion.0, &mut motion.1);
         motion
     }
 
@@ -86,14 +81,31 @@ impl<const J: usize> EstimatorConfig<J> {
             Reading::Counts(counts) => Some(*counts),
             Reading::Motion { angles_rad, .. } => {
                 let mut counts = [0; J];
-                for ((count, angle_rad), encoder) in counts.iter_mut().zip(angles_rad).zip(&self.encoders) {
-                    let exact = angle_rad / encoder.rad_per_count;
-                    // The conversion rounds towards zero and saturates; it makes 0 of what is no number.
-                    *count = (if exact < 0.0 { exact - 0.5 } else { exact + 0.5 }) as i32;
-                }
+                count(&self.encoders, angles_rad, &mut counts);
                 Some(counts)
             }
             Reading::Failed(_) | Reading::Tested { .. } => None,
         }
+    }
+}
+
+// Slices, so that the compiler does not write these loops out for every hand.
+#[cold]
+#[inline(never)]
+fn apply(encoders: &[Encoder], angles_rad: &mut [f32], speeds_rad_s: &mut [f32]) {
+    for ((angle_rad, speed_rad_s), encoder) in angles_rad.iter_mut().zip(speeds_rad_s).zip(encoders) {
+        let zero_rad = encoder.zero_count as f32 * encoder.rad_per_count;
+        *angle_rad = encoder.sign() * (*angle_rad - zero_rad);
+        *speed_rad_s *= encoder.sign();
+    }
+}
+
+#[cold]
+#[inline(never)]
+fn count(encoders: &[Encoder], angles_rad: &[f32], counts: &mut [i32]) {
+    for ((count, angle_rad), encoder) in counts.iter_mut().zip(angles_rad).zip(encoders) {
+        let exact = angle_rad / encoder.rad_per_count;
+        // The conversion rounds towards zero and saturates; it makes 0 of what is no number.
+        *count = (if exact < 0.0 { exact - 0.5 } else { exact + 0.5 }) as i32;
     }
 }

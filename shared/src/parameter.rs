@@ -21,9 +21,17 @@ impl Text {
         Self::new("", text)
     }
 
-    /// Returns its bytes.
-    pub fn bytes(self) -> impl Iterator<Item = u8> {
-        self.prefix.bytes().chain(self.rest.bytes())
+    /// Returns its hash, FNV-1a of 32 bits.
+    pub const fn hash(self) -> u32 {
+        let mut hash = 0x811C_9DC5_u32;
+        let (prefix, rest) = (self.prefix.as_bytes(), self.rest.as_bytes());
+        let mut k = 0;
+        while k < prefix.len() + rest.len() {
+            let byte = if k < prefix.len() { prefix[k] } else { rest[k - prefix.len()] };
+            hash = (hash ^ byte as u32).wrapping_mul(0x0100_0193);
+            k += 1;
+        }
+        hash
     }
 }
 

@@ -155,6 +155,22 @@ const TABLE: [Row; Parameter::COUNT] = {
     table
 };
 
+/// The hash of each name: the firmware has no use for the names themselves.
+const HASHES: [u32; Parameter::COUNT] = {
+    let mut hashes = [0; Parameter::COUNT];
+    let mut k = 0;
+    while k < hashes.len() {
+        hashes[k] = Parameter::ALL[k].label().key.hash();
+        let mut before = 0;
+        while before < k {
+            assert!(hashes[before] != hashes[k], "two names have the same hash");
+            before += 1;
+        }
+        k += 1;
+    }
+    hashes
+};
+
 impl Parameter {
     /// Number of parameters.
     pub const COUNT: usize = ROWS.len() + 2 * GAIN_COUNT + LAWS.len();
@@ -202,20 +218,20 @@ impl Parameter {
         TABLE.get(usize::from(self.0)).copied().unwrap_or(TABLE[0])
     }
 
-    fn label(self) -> Label {
-        match self.row().place {
+    const fn label(self) -> Label {
+        match TABLE[self.0 as usize].place {
             Place::Row(number) => LABELS[number as usize],
             Place::Gain(k) => {
-                let Gain { key, unit, words, .. } = GAINS[usize::from(k)];
-                Label { key: key.into(), unit, words: words.into() }
+                let Gain { key, unit, words, .. } = GAINS[k as usize];
+                Label { key: Text::plain(key), unit, words: Text::plain(words) }
             }
             Place::Limit(k) => {
-                let Gain { key, unit, .. } = GAINS[usize::from(k)];
+                let Gain { key, unit, .. } = GAINS[k as usize];
                 let words = Text::new("Most that may be asked for of ", key);
                 Label { key: Text::new("limits.", key), unit, words }
             }
             Place::Law(k) => {
-                let (key, words) = LAWS[usize::from(k)];
+                let (key, words) = LAWS[k as usize];
                 let words = Text::new("1 where it may act, else 0: ", words);
                 Label { key: Text::new("laws.", key), unit: "", words }
             }
@@ -225,6 +241,11 @@ impl Parameter {
     /// Returns its name.
     pub fn key(self) -> Text {
         self.label().key
+    }
+
+    /// Returns the hash of its name, by which it is saved: another firmware may have another number for it.
+    pub fn key_hash(self) -> u32 {
+        HASHES.get(usize::from(self.0)).copied().unwrap_or(0)
     }
 
     /// Returns its unit; empty for a pure number.

@@ -5,7 +5,7 @@
 
 use crate::identity::Restored;
 use crate::parameters::{Parameter, Setting};
-use crate::store::{Entry, Store, StoreError, key_hash};
+use crate::store::{Entry, Store, StoreError};
 use crate::tick::Params;
 use embedded_storage::nor_flash::NorFlash;
 
@@ -86,7 +86,7 @@ impl Saving {
             self.entry_count += 1;
             return None;
         }
-        Some(Order::Put(Entry { key: key_hash(parameter.key()), index, value }))
+        Some(Order::Put(Entry { key: parameter.key_hash(), index, value }))
     }
 }
 
@@ -143,5 +143,5 @@ impl<S: NorFlash> Store<S> {
 
 /// The parameter whose key has a hash.
 fn named(hash: u32) -> Option<Parameter> {
-    Parameter::ALL.into_iter().find(|parameter| key_hash(parameter.key()) == hash)
+    Parameter::ALL.into_iter().find(|parameter| parameter.key_hash() == hash)
 }

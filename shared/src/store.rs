@@ -19,7 +19,6 @@
 //! and can say what it left out.
 
 use crate::link::checksum::Checksum;
-use crate::parameter::Text;
 use core::fmt;
 use embedded_storage::nor_flash::{NorFlash, NorFlashError, NorFlashErrorKind};
 
@@ -55,19 +54,12 @@ const FEW_SLOTS: u32 = 8;
 /// A parameter that was saved.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Entry {
-    /// [`key_hash`] of its key.
+    /// The [hash](crate::parameters::Parameter::key_hash) of its key.
     pub key: u32,
     /// Of which joint or axis.
     pub index: u8,
     /// Its value.
     pub value: f32,
-}
-
-/// What a parameter is called in a set: the CRC-32 of its key.
-pub fn key_hash(key: impl Into<Text>) -> u32 {
-    let mut checksum = Checksum::START;
-    key.into().bytes().for_each(|byte| checksum.advance(byte));
-    u32::from_le_bytes(checksum.bytes())
 }
 
 /// A set that is valid.
@@ -343,6 +335,7 @@ impl<F: NorFlash> Store<F> {
     }
 
     /// Writes the next words of a set.
+    #[inline(never)]
     fn extend(&mut self, mut writing: Writing, words: &[u32]) -> Result<()> {
         for &word in words {
             self.program(writing.next, word)?;
@@ -361,10 +354,12 @@ impl<F: NorFlash> Store<F> {
         sector.begin + self.sector_bytes()
     }
 
+    #[inline(never)]
     fn program(&mut self, at: u32, word: u32) -> Result<()> {
         self.flash.write(at, &word.to_le_bytes()).map_err(|error| StoreError::Flash(error.kind()))
     }
 
+    #[inline(never)]
     fn word(&mut self, at: u32) -> Result<u32> {
         let mut bytes = [0; WORD as usize];
         self.flash.read(at, &mut bytes).map_err(|error| StoreError::Flash(error.kind()))?;

@@ -153,8 +153,8 @@ fn a_million_requests_do_no_harm() {
     };
     let params = hand();
     let (heartbeat_ms, slew_nm) = (100, params.file().limits.slew_nm_s.unwrap().map(|slew| slew * 1e-3));
-    let device = Device::new(params, Identity::of(image, Clock::External));
-    let mut device = device.with_store(Restored::default());
+    let identity = Identity { restored: Some(Restored::default()), ..Identity::of(image, Clock::External) };
+    let mut device = Device::new(params, identity);
     let (mut is_saving, mut stored, mut saved) = (false, None, 0);
     let mut burst = Box::new(Burst::new());
     let mut random = Random(1);

@@ -4,9 +4,10 @@ mod common;
 mod flash;
 
 use blindgrasp_shared::identity::Restored;
+use blindgrasp_shared::parameter::Text;
 use blindgrasp_shared::parameters::{Parameter, Setting};
 use blindgrasp_shared::saved::{Order, Saving};
-use blindgrasp_shared::store::{Entry, Store, StoreError, key_hash};
+use blindgrasp_shared::store::{Entry, Store, StoreError};
 use blindgrasp_shared::tick::Params;
 use common::{JOINTS, config, params};
 use flash::Memory;
@@ -119,9 +120,9 @@ fn defaults_are_the_file_again() {
 
 #[test]
 fn what_does_not_fit_is_left_out_and_told() {
-    let good = Entry { key: key_hash("force_n"), index: 0, value: 2.0 };
-    let unknown = Entry { key: key_hash("thumb.warp"), ..good };
-    let no_such_joint = Entry { key: key_hash("damping_nm_s"), index: 12, value: 1e-3 };
+    let good = Entry { key: FORCE.key_hash(), index: 0, value: 2.0 };
+    let unknown = Entry { key: Text::plain("thumb.warp").hash(), ..good };
+    let no_such_joint = Entry { key: Parameter::DAMPING.key_hash(), index: 12, value: 1e-3 };
     let out_of_range = Entry { value: -1.0, index: 1, ..no_such_joint };
     let not_finite = Entry { value: f32::INFINITY, ..out_of_range };
     let mut store = store();
@@ -147,7 +148,7 @@ fn what_does_not_fit_is_left_out_and_told() {
 #[test]
 fn another_hands_parameters_are_left_out() {
     let mut store = store();
-    let entry = Entry { key: key_hash("force_n"), index: 0, value: 2.0 };
+    let entry = Entry { key: FORCE.key_hash(), index: 0, value: 2.0 };
     for order in [Order::Begin(1), Order::Put(entry), Order::Finish] {
         assert_eq!(store.obey(&order, HAND + 1), Ok(()));
     }
@@ -176,7 +177,7 @@ fn a_set_that_fails_is_told_once_and_the_one_before_stays() {
 /// Another firmware may have had another order.
 #[test]
 fn a_limit_that_was_saved_before_its_gain_is_there_again() {
-    let entry = |key: &'static str, value| Entry { key: key_hash(key), index: 0, value };
+    let entry = |key, value| Entry { key: named(key).key_hash(), index: 0, value };
     let mut store = store();
     for order in [
         Order::Begin(2),
@@ -194,7 +195,7 @@ fn a_limit_that_was_saved_before_its_gain_is_there_again() {
 /// Whatever was saved, the hand's file is the ceiling.
 #[test]
 fn what_is_looser_than_the_file_is_left_out() {
-    let entry = |parameter: Parameter, value| Entry { key: key_hash(parameter.key()), index: 0, value };
+    let entry = |parameter: Parameter, value| Entry { key: parameter.key_hash(), index: 0, value };
     let looser = [entry(Parameter::TORQUE_LIMIT, 100.0), entry(Parameter::STOP_MARGIN, 0.0)];
     let mut store = store();
     assert_eq!(store.obey(&Order::Begin(2), HAND), Ok(()));

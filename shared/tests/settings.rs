@@ -57,12 +57,9 @@ impl Bench {
             store.prepare().expect("there is power");
             store.restore(HAND, &mut params, |_| {})
         });
-        let device = Device::new(params, Identity::of(IMAGE, Clock::External));
+        let identity = Identity { restored, ..Identity::of(IMAGE, Clock::External) };
         let mut bench = Self {
-            device: match restored {
-                Some(restored) => device.with_store(restored),
-                None => device,
-            },
+            device: Device::new(params, identity),
             burst: Box::new(Burst::new()),
             store,
             reading: Reading::Counts(facing_counts()),
@@ -300,7 +297,7 @@ fn what_was_saved_is_in_force_after_a_start_and_defaults_forget_it() {
         let mut bench = bench.restart();
         assert_eq!(bench.params().config(), set.config());
         let identity = bench.hello();
-        assert_eq!(identity.restored, Restored { saved: zeros as u16 + 2, ignored: 0 });
+        assert_eq!(identity.restored, Some(Restored { saved: zeros as u16 + 2, ignored: 0 }));
         let changed = [Parameter::ENCODER_ZERO, Parameter::TORQUE_LIMIT, Parameter::MOTOR_REVERSED];
         assert_eq!(identity.changed, changed.into_iter().map(bit).sum::<u64>());
         assert!(!bench.is_unconfirmed(), "it was confirmed before it was saved");
@@ -313,7 +310,7 @@ fn what_was_saved_is_in_force_after_a_start_and_defaults_forget_it() {
         assert_eq!(bench.hello().changed, 0);
         assert_eq!(bench.arm(), Some(Refusal::Unconfirmed), "the zeros are others");
         let mut bench = bench.restart();
-        assert_eq!((bench.params().config(), bench.hello().restored), (&config(), Restored::default()));
+        assert_eq!((bench.params().config(), bench.hello().restored), (&config(), Some(Restored::default())));
     }
 }
 

@@ -2,8 +2,9 @@
 
 mod flash;
 
+use blindgrasp_shared::parameter::Text;
 use blindgrasp_shared::parameters::Parameter;
-use blindgrasp_shared::store::{Entry, MOST_ENTRIES, MOST_WORDS, SLOT_BYTES, Store, StoreError, key_hash};
+use blindgrasp_shared::store::{Entry, MOST_ENTRIES, MOST_WORDS, SLOT_BYTES, Store, StoreError};
 use crc::{CRC_32_ISO_HDLC, Crc};
 use flash::Memory;
 use flash::random::Random;
@@ -237,7 +238,7 @@ fn put_words(memory: &mut Memory, slot: usize, words: &[u32]) {
 
 #[test]
 fn what_stands_in_flash_stays_readable_and_sequence_numbers_wrap() {
-    let entry = |value| Entry { key: key_hash("force_n"), index: 0, value };
+    let entry = |value| Entry { key: Parameter::gain(0).key_hash(), index: 0, value };
     let mut memory = Memory::blank(8);
     put_words(&mut memory, 0, &[0x5EAD_1E55]);
     put_words(&mut memory, 1, &set_words(u32::MAX - 1, entry(1.0)));
@@ -296,10 +297,15 @@ fn other_sectors_are_refused() {
 
 #[test]
 fn every_parameter_has_a_name_of_its_own() {
-    let hashes: HashSet<u32> = Parameter::ALL.iter().map(|parameter| key_hash(parameter.key())).collect();
+    let hashes: HashSet<u32> = Parameter::ALL.iter().map(|parameter| parameter.key_hash()).collect();
     assert_eq!(hashes.len(), Parameter::ALL.len());
-    // As in Python: zlib.crc32(b"blindgrasp" + b"force_n").
-    assert_eq!(key_hash("force_n"), Crc::<u32>::new(&CRC_32_ISO_HDLC).checksum(b"blindgraspforce_n"));
+    // The reference values of FNV-1a, 32 bits, for "", "a" and "foobar".
+    let known = [("", 0x811c_9dc5), ("a", 0xe40c_292c), ("foobar", 0xbf9c_f968)];
+    for (text, hash) in known {
+        assert_eq!(Text::plain(text).hash(), hash);
+        assert_eq!(Text::new(text, "").hash(), hash);
+    }
+    assert_eq!(Text::new("foo", "bar").hash(), 0xbf9c_f968);
 }
 
 proptest! {

@@ -194,7 +194,7 @@ const IDENTITY: Identity<'static> = Identity {
     clock_hz: 168_000_000,
     most_baud: 1_000_000,
     changed: 0,
-    restored: Restored { saved: 2, ignored: 1 },
+    restored: Some(Restored { saved: 2, ignored: 1 }),
 };
 
 /// A hand of three joints in a fault.

@@ -578,8 +578,7 @@ impl Console {
             let keys = firmware.changed.iter().map(ToString::to_string).collect::<Vec<_>>();
             say(format_args!("other than in the hand's file: {}; `differs` shows them", keys.join(", ")))?;
         }
-        let Restored { saved, ignored } = firmware.restored;
-        if ignored > 0 {
+        if let Some(Restored { saved, ignored: ignored @ 1.. }) = firmware.restored {
             eprintln!(
                 "blindgrasp: warning: of {saved} parameters that were saved {ignored} are not in force: they were saved for another hand \
                  or by another firmware, or are looser than the hand's file; set what is missing and `save`, or `defaults`"

@@ -91,14 +91,11 @@ impl Boot {
             crash,
             brown_out,
             clock_hz,
+            restored,
             most_baud: faster_bauds.iter().copied().fold(wiring::BAUD, u32::max),
             ..Identity::of(image, clock)
         };
         let device = Device::new(params, told).with_faster_bauds(faster_bauds);
-        let device = match restored {
-            Some(restored) => device.with_store(restored),
-            None => device,
-        };
         place.write(Control::new(device, burst))
     }
 }
