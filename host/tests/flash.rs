@@ -78,6 +78,15 @@ mod with_probes {
     /// No probe has this selector, so that no test ever flashes what happens to be connected.
     const NO_PROBE: &str = "dead:beef:blindgrasp-test";
 
+    /// The chip that is meant where nothing else is said, by the command's help.
+    fn default_chip() -> String {
+        let help = blindgrasp(&Folder::new("help"), &["flash", "--help"]).stdout;
+        let help = String::from_utf8(help).expect("UTF-8");
+        let (_, chip) = help.split_once("--chip <NAME>").expect("the option");
+        let (_, default) = chip.split_once("[default: ").expect("its default");
+        default.split_once(']').expect("the end of it").0.to_owned()
+    }
+
     #[test]
     fn a_dry_run_tells_what_the_image_is_and_takes() {
         let folder = Folder::new("dry");
@@ -89,7 +98,7 @@ mod with_probes {
         let flash_bytes = Elf::good(&image()).segments[0].bytes.len() + 64;
         let expected = json!({
             "image": path,
-            "chip": "STM32F405RGTx",
+            "chip": default_chip(),
             "kind": "hand",
             "hand": "three-finger",
             "hand_hash": "01234567",
@@ -164,7 +173,10 @@ mod with_probes {
         large.segments[0].bytes.resize(1024 * 1024, 0);
         large.segments[0].memory_bytes = 1024 * 1024;
         large.segments[1].stored = FLASH + 1024 * 1024;
-        refuse(&large.bytes(), &["on STM32F405RGTx", "needs 1048640 bytes of flash", "has 1048576"]);
+        refuse(
+            &large.bytes(),
+            &[&format!("on {}", default_chip()), "needs 1048640 bytes of flash", "has 1048576"],
+        );
         let mut saving = good.clone();
         for (name, at) in [("_saved_start", FLASH + 0xC_0000), ("_saved_end", FLASH + 0x10_0000)] {
             saving.symbols.push((name.to_owned(), at, false));
@@ -190,13 +202,17 @@ mod with_probes {
             &["cannot read the image nowhere/hand"],
         );
         assert_refused(&folder, &["flash", "/", "--dry-run"], &["/ is no image"]);
+        let default = default_chip();
+        // Without its package, and then without its flash.
+        let family = default.strip_suffix("Tx").expect("a package");
+        let misspelt = format!("{}X", &family[..family.len() - 1]);
         let chip = |name| ["flash", path.as_str(), "--dry-run", "--chip", name];
         assert_refused(
             &folder,
-            &chip("STM32F405RX"),
-            &["no chip is called `STM32F405RX`; did you mean STM32F405RG?"],
+            &chip(&misspelt),
+            &[&format!("no chip is called `{misspelt}`; did you mean {family}?")],
         );
-        assert_refused(&folder, &chip("abacus"), &["no chip is called `abacus`", "such as STM32F405RGTx"]);
+        assert_refused(&folder, &chip("abacus"), &["no chip is called `abacus`", "https://probe.rs/targets"]);
         assert_refused(&folder, &chip("GD32VF103CB"), &["no Arm core"]);
     }
 
@@ -253,7 +269,7 @@ mod with_probes {
     #[test]
     fn probe_rs_itself_would_write_where_nothing_may_be_written() {
         // Which is why it is not asked alone: bytes there can be written once, and never again.
-        let chip = Chip::by_name("STM32F405RGTx").expect("known");
+        let chip = Chip::by_name(&default_chip()).expect("known");
         let mut elf = Elf::good(&image());
         elf.segments.push(Segment {
             stored: 0x1FFF_7800,
@@ -270,7 +286,7 @@ mod with_probes {
 
     #[test]
     fn the_sectors_that_are_erased_are_known() {
-        let chip = Chip::by_name("STM32F405RGTx").expect("known");
+        let chip = Chip::by_name(&default_chip()).expect("known");
         let flash: Vec<_> = chip
             .memory()
             .sectors
@@ -285,18 +301,20 @@ mod with_probes {
     #[test]
     fn another_chip_is_recognised() {
         let kib = |size: u64| size * 1024;
+        let expected = Some(0x413);
         // Revision in the high half.
-        assert_eq!(contradiction("STM32F405RGTx", kib(1024), 0x1007_6413, 1024), None);
-        assert_eq!(contradiction("stm32f405rgtx", kib(1024), 0x2000_6411, 1024), None);
-        let found = contradiction("STM32F405RGTx", kib(1024), 0x1007_6413, 512).expect("other");
-        assert_eq!(found, "a variant with 512 KiB of flash in place of 1024");
-        let found = contradiction("STM32F405RGTx", kib(1024), 0x1001_6433, 512).expect("other");
-        assert!(found.contains("STM32F401RE") && found.contains("0x433"), "{found}");
-        assert_eq!(contradiction("STM32F401RETx", kib(512), 0x1001_6433, 512), None);
-        let found = contradiction("STM32F405RGTx", kib(1024), 0, 0).expect("other");
-        assert_eq!(found, "unknown (device 0x000)");
-        // Of a chip that is not in the table, nothing is known.
-        assert_eq!(contradiction("STM32F205RGTx", kib(1024), 0x413, 1024), None);
+        assert_eq!(contradiction(expected, kib(1024), 0x1007_6413, 1024), None);
+        assert_eq!(contradiction(expected, kib(1024), 0x2000_6411, 1024), None);
+        assert_eq!(contradiction(expected, kib(512), 0x1007_6413, 1024), None);
+        let found = contradiction(expected, kib(1024), 0x1007_6413, 512).expect("other");
+        assert_eq!(found, "one with 512 KiB of flash in place of 1024");
+        let found = contradiction(expected, kib(512), 0x1001_6433, 512).expect("other");
+        assert_eq!(found, "a device 0x433, where the image is for a device 0x413");
+        let found = contradiction(expected, kib(1024), 0, 0).expect("other");
+        assert!(found.contains("a device 0x000"), "{found}");
+        // An image that does not say what it is for.
+        assert_eq!(contradiction(None, kib(512), 0x1001_6433, 512), None);
+        assert!(contradiction(None, kib(1024), 0x1001_6433, 512).is_some());
     }
 
     /// Probes that are only listed.

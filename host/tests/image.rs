@@ -43,6 +43,10 @@ fn a_good_image_is_understood() {
     let firmware = Firmware::parse(&file).expect("an image");
     assert_eq!(firmware.image, image());
     assert_eq!(firmware.rtt_control_block, Some(u64::from(RAM) + 16));
+    assert_eq!((firmware.saved.clone(), firmware.device), (None, None));
+    let mut telling = elf.clone();
+    telling.symbols.push(("_chip_device".to_owned(), 0x413, false));
+    assert_eq!(Firmware::parse(&telling.bytes()).expect("an image").device, Some(0x413));
     let code = elf.segments[0].bytes.len() as u64;
     let stored: Vec<_> = firmware.stored().map(|(address, bytes)| (address, bytes.len() as u64)).collect();
     assert_eq!(stored, [(u64::from(FLASH), code), (u64::from(FLASH) + code, 64)]);

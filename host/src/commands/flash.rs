@@ -143,7 +143,7 @@ mod probe {
         }
         let info = choose(&Lister::new(), arguments.probe.as_deref())?;
         eprintln!("blindgrasp: probe {}; the joints must be without power", describe(&info));
-        let mut session = attach(&info, &chip)?;
+        let mut session = attach(&info, &chip, firmware.device)?;
         if arguments.brown_out.is_some() {
             with_options(&mut session, &chip, |core| options::unprotected(core).map(|_| ()))?;
         }
@@ -163,7 +163,7 @@ mod probe {
             let stop = stop_at_interrupt()?;
             eprintln!("blindgrasp: logs of the firmware, with the time of this host in UTC; Ctrl-C ends");
             // The same probe, by its serial number: it may come back elsewhere on the bus.
-            let connect = || attach(&info, &chip).ok();
+            let connect = || attach(&info, &chip, firmware.device).ok();
             monitor::follow(session, connect, control_block, &logs, &stop, show)?;
         }
         Ok(outcome)

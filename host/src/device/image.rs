@@ -30,6 +30,8 @@ pub struct Firmware<'a> {
     /// Flash where it keeps what outlives flashing, saved parameters, by the symbols `_saved_start` and `_saved_end` of its
     /// `memory.x`.
     pub saved: Option<Range<u64>>,
+    /// The device that it is for, as the chip calls itself, by the symbol `_chip_device` of its `memory.x`.
+    pub device: Option<u32>,
 }
 
 /// A piece of memory that a firmware occupies.
@@ -391,8 +393,9 @@ impl<'a> Firmware<'a> {
             let mut symbols = parsed.symbols();
             symbols.find(|symbol| !symbol.is_undefined() && symbol.name() == Ok(name)).map(|s| s.address())
         };
+        let device = symbol("_chip_device").and_then(|device| device.try_into().ok());
         let saved = symbol("_saved_start").zip(symbol("_saved_end")).map(|(start, end)| start..end);
-        Ok(Self { image, segments, rtt_control_block: symbol("_SEGGER_RTT"), saved })
+        Ok(Self { image, segments, rtt_control_block: symbol("_SEGGER_RTT"), saved, device })
     }
 
     /// What is stored in flash: address and bytes.

@@ -3,9 +3,9 @@
 use blindgrasp_shared::identity::Image;
 use blindgrasp_shared::telemetry::INTERFACE_VERSION;
 
-/// Start of the flash of an STM32F405.
+/// Start of flash.
 pub(crate) const FLASH: u32 = 0x0800_0000;
-/// Start of its RAM.
+/// Start of RAM.
 pub(crate) const RAM: u32 = 0x2000_0000;
 /// One past its end.
 pub(crate) const RAM_END: u32 = 0x2002_0000;

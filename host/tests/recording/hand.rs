@@ -21,7 +21,7 @@ pub(crate) fn about(hand: &str) -> About {
     let model = HandModel::load(hand).unwrap();
     About::of(&Identity {
         brown_out: BrownOut::Level3,
-        clock_hz: 168_000_000,
+        clock_hz: 96_000_000,
         most_baud: 1_000_000,
         ..Identity::of(
             Image {

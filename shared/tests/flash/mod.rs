@@ -11,7 +11,7 @@ use embedded_storage::nor_flash::{
 };
 use random::Random;
 
-/// NOR flash of two sectors, as the data sheet of an STM32F405 describes it: bits are erased to ones, a sector at a time,
+/// NOR flash of two sectors, as microcontrollers have it: bits are erased to ones, a sector at a time,
 /// and programmed to zeros, a word at a time; a word is programmed once, or once more to zero.
 pub(crate) struct Memory {
     pub(crate) bytes: Vec<u8>,

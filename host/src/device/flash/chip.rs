@@ -51,7 +51,7 @@ pub enum ChipError {
 
 fn suggestion(similar: &[String]) -> String {
     match similar {
-        [] => "; give its full name, such as STM32F405RGTx".to_owned(),
+        [] => "; give its full name, as https://probe.rs/targets has it".to_owned(),
         names => format!("; did you mean {}?", names.join(", ")),
     }
 }

@@ -69,7 +69,7 @@ pub enum ProbeError {
     },
     /// Another chip answers.
     #[error(
-        "the connected chip is {found}, not {chip}; nothing was erased; check --chip, and which board is connected"
+        "the connected chip is {found}; nothing was erased; check --chip, which is {chip}, and which board is connected"
     )]
     OtherChip {
         /// What it should be.
@@ -77,9 +77,10 @@ pub enum ProbeError {
         /// What it is.
         found: String,
     },
-    /// Its option bytes are laid out in another way.
+    /// Its option bytes may be laid out in another way.
     #[error(
-        "--brown-out knows the option bytes of an STM32F405, 407, 415 or 417, not those of {0}; nothing was changed"
+        "--brown-out knows the option bytes of devices {OPTION_DEVICE:#05x} alone (reference manual RM0090), and not those of \
+        {0}; nothing was changed"
     )]
     OtherOptions(String),
     /// Its option bytes are not as they should be.
@@ -129,12 +130,13 @@ pub fn describe(info: &DebugProbeInfo) -> String {
     format!("{} ({})", DebugProbeSelector::from(info), info.identifier)
 }
 
-/// Connects to a chip, and checks that it is that chip. A chip that does not answer is tried again with its reset held,
-/// which helps against firmware that sleeps or has its debug pins in use.
+/// Connects to a chip, and checks that it is the device that the image expects, if there is one, with as much flash as it
+/// should have. A chip that does not answer is tried again with its reset held, which helps against firmware that sleeps or has
+/// its debug pins in use.
 ///
 /// # Errors
 /// If it is not there, or another one.
-pub fn attach(info: &DebugProbeInfo, chip: &Chip) -> Result<Session, ProbeError> {
+pub fn attach(info: &DebugProbeInfo, chip: &Chip, expected: Option<u32>) -> Result<Session, ProbeError> {
     let mut probe = open(info)?;
     let voltage = match probe.get_target_voltage() {
         Ok(Some(voltage_v)) => format!(" (its supply is at {voltage_v:.2} V)"),
@@ -156,7 +158,7 @@ pub fn attach(info: &DebugProbeInfo, chip: &Chip) -> Result<Session, ProbeError>
             }
         },
     };
-    check_device(&mut session, chip)?;
+    check_device(&mut session, chip, expected)?;
     Ok(session)
 }
 
@@ -180,40 +182,28 @@ const DBGMCU_IDCODE: u64 = 0xE004_2000;
 /// Size of the flash, KiB (RM0090, 39.2).
 const FLASH_SIZE_KIB: u64 = 0x1FFF_7A22;
 
-/// Devices of the STM32F4 family, with the start of the names of their chips (the section on the MCU device ID code of
-/// RM0090, RM0368, RM0383, RM0386, RM0390, RM0401, RM0402 and RM0430).
-const DEVICES: [(u16, &[&str]); 11] = [
-    (0x413, &["STM32F405", "STM32F407", "STM32F415", "STM32F417"]),
-    (0x419, &["STM32F427", "STM32F429", "STM32F437", "STM32F439"]),
-    (0x421, &["STM32F446"]),
-    (0x423, &["STM32F401CB", "STM32F401RB", "STM32F401VB", "STM32F401CC", "STM32F401RC", "STM32F401VC"]),
-    (0x431, &["STM32F411"]),
-    (0x433, &["STM32F401CD", "STM32F401RD", "STM32F401VD", "STM32F401CE", "STM32F401RE", "STM32F401VE"]),
-    (0x434, &["STM32F469", "STM32F479"]),
-    (0x441, &["STM32F412"]),
-    (0x458, &["STM32F410"]),
-    (0x463, &["STM32F413", "STM32F423"]),
-    // The first silicon of 0x413 told 0x411 (errata sheet of the STM32F40x, 2.1.1).
-    (0x411, &["STM32F405", "STM32F407", "STM32F415", "STM32F417"]),
-];
+/// The device whose option register is known: [`options`](crate::device::options).
+const OPTION_DEVICE: u32 = 0x413;
 
-/// Why a device is not a chip of this name and flash; nothing if it is, or if it cannot be told.
+/// The device of a chip, from the word at DBGMCU_IDCODE.
+fn device(idcode: u32) -> u32 {
+    match idcode & 0xFFF {
+        // The first silicon of that one (errata sheet ES0182, 2.1.1).
+        0x411 => 0x413,
+        device => device,
+    }
+}
+
+/// Why a connected chip is not the one that is meant; nothing if it may be. `expected` is what the image says of it.
 ///
 /// `idcode` is the word at DBGMCU_IDCODE, `flash_kib` the half-word that tells the size of the flash.
-pub fn contradiction(chip: &str, flash_bytes: u64, idcode: u32, flash_kib: u16) -> Option<String> {
-    let chip = chip.to_ascii_uppercase();
-    let is_of = |names: &[&str]| names.iter().any(|name| chip.starts_with(name));
-    if !DEVICES.iter().any(|(_, names)| is_of(names)) {
-        return None;
-    }
-    let device = (idcode & 0xFFF) as u16;
-    match DEVICES.iter().find(|(code, _)| *code == device) {
-        Some((_, names)) if is_of(names) => {}
-        Some((_, names)) => return Some(format!("a {} (device 0x{device:03x})", names.join(" or "))),
-        None => return Some(format!("unknown (device 0x{device:03x})")),
+pub fn contradiction(expected: Option<u32>, flash_bytes: u64, idcode: u32, flash_kib: u16) -> Option<String> {
+    let found = device(idcode);
+    if let Some(expected) = expected.filter(|&expected| expected != found) {
+        return Some(format!("a device {found:#05x}, where the image is for a device {expected:#05x}"));
     }
     let smaller = u64::from(flash_kib) * 1024 < flash_bytes;
-    smaller.then(|| format!("a variant with {flash_kib} KiB of flash in place of {}", flash_bytes / 1024))
+    smaller.then(|| format!("one with {flash_kib} KiB of flash in place of {}", flash_bytes / 1024))
 }
 
 /// A halted core as what option bytes are read and written through.
@@ -240,31 +230,34 @@ pub fn with_options<T>(
     chip: &Chip,
     act: impl FnOnce(&mut Halted<'_, '_>) -> Result<T, OptionsError<probe_rs::Error>>,
 ) -> Result<T, ProbeError> {
-    if !has_option_register(chip) {
+    let lost = |error| ProbeError::Lost(chip.name().to_owned(), Box::new(error));
+    if !has_idcode(chip) {
         return Err(ProbeError::OtherOptions(chip.name().to_owned()));
     }
-    let lost = |error| ProbeError::Lost(chip.name().to_owned(), Box::new(error));
     let mut core = session.core(0).map_err(lost)?;
+    let found = device(core.read_word_32(DBGMCU_IDCODE).map_err(lost)?);
+    if found != OPTION_DEVICE {
+        return Err(ProbeError::OtherOptions(format!("a device {found:#05x}")));
+    }
     core.halt(HALT_TIMEOUT).map_err(lost)?;
     Ok(act(&mut Halted(&mut core))?)
 }
 
-/// Chips whose option register is the one of RM0090, section on the STM32F405, 407, 415 and 417.
-fn has_option_register(chip: &Chip) -> bool {
-    let name = chip.name().to_ascii_uppercase();
-    DEVICES.iter().any(|(code, names)| *code == 0x413 && names.iter().any(|start| name.starts_with(start)))
+/// Whether it has the two registers that are looked at where those of an STM32F4 are.
+fn has_idcode(chip: &Chip) -> bool {
+    chip.name().to_ascii_uppercase().starts_with("STM32F4")
 }
 
-fn check_device(session: &mut Session, chip: &Chip) -> Result<(), ProbeError> {
+fn check_device(session: &mut Session, chip: &Chip, expected: Option<u32>) -> Result<(), ProbeError> {
     let lost = |error| ProbeError::Lost(chip.name().to_owned(), Box::new(error));
-    if !chip.name().to_ascii_uppercase().starts_with("STM32F4") {
+    if !has_idcode(chip) {
         return Ok(());
     }
     let mut core = session.core(0).map_err(lost)?;
     let idcode = core.read_word_32(DBGMCU_IDCODE).map_err(lost)?;
     let flash_kib = core.read_word_16(FLASH_SIZE_KIB).map_err(lost)?;
     let flash = &chip.memory().flash;
-    match contradiction(chip.name(), flash.end - flash.start, idcode, flash_kib) {
+    match contradiction(expected, flash.end - flash.start, idcode, flash_kib) {
         Some(found) => Err(ProbeError::OtherChip { chip: chip.name().to_owned(), found }),
         None => Ok(()),
     }
