@@ -2,13 +2,10 @@
 //!
 //! Nothing is decided here: what the hand does is in [`Device`], the same code on the host.
 
+use crate::boards::Board;
 use crate::model::{FINGERS, JOINTS};
-#[cfg(target_os = "none")]
-use crate::{
-    board::supply,
-    queue::{self, ControlEnd, Telemetry},
-    schedule::Turn,
-};
+use crate::queue::{self, ControlEnd, Telemetry};
+use crate::schedule::Turn;
 use blindgrasp_shared::device::{Device, Inputs, Outputs};
 use blindgrasp_shared::joints::Joints;
 use blindgrasp_shared::telemetry::burst::Burst;
@@ -26,18 +23,17 @@ pub struct Timing {
 }
 
 /// What the control task does each time that it starts: a turn, and its answers to the queues.
-#[cfg(target_os = "none")]
-pub fn task(
+pub fn task<B: Board>(
     control: &mut Control,
-    joints: &mut impl Joints<JOINTS>,
+    joints: &mut B::Joints,
     queues: &mut ControlEnd<'_>,
     last: Timing,
 ) -> Timing {
-    let turn = Turn::begin();
+    let turn = Turn::begin::<B>();
     joints.start();
     let inputs = Inputs {
         late: last.late,
-        supply_low: supply::take(),
+        supply_low: B::take_supply_low(),
         cycles: last.cycles,
         dropped: queues.dropped(),
         waiting: queues.waiting(),
@@ -58,7 +54,7 @@ pub fn task(
     if let Some(order) = outputs.order {
         queues.order(order);
     }
-    turn.end()
+    turn.end::<B>()
 }
 
 /// The hand, and what one turn leaves for the next.

@@ -27,6 +27,8 @@ pub mod link;
 pub mod model;
 pub mod pil;
 pub mod queue;
+pub mod schedule;
+pub mod tasks;
 
 #[cfg(target_os = "none")]
 pub mod bench;
@@ -37,12 +39,15 @@ pub mod report;
 #[cfg(all(target_os = "none", not(feature = "no-panic")))]
 pub mod saved;
 #[cfg(target_os = "none")]
-pub mod schedule;
-#[cfg(target_os = "none")]
 pub mod semihosting;
+#[cfg(all(target_os = "none", not(feature = "no-panic")))]
+pub mod start;
 
 /// The board that the images are for.
 pub use boards::stm32f405 as board;
+/// Its type.
+#[cfg(target_os = "none")]
+pub type Chosen = board::Stm32f405;
 
 #[cfg(all(target_os = "none", not(feature = "no-panic")))]
 use defmt_rtt as _;

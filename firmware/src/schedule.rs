@@ -1,14 +1,14 @@
 //! The 1 kHz of the control task: the processor's own timer, and what one turn of it took.
 
-use crate::board;
+use crate::boards::Board;
 use crate::control::Timing;
 use core::sync::atomic::{AtomicU32, Ordering};
-use cortex_m::peripheral::syst::SystClkSource;
-use cortex_m::peripheral::{DCB, DWT, SCB, SYST};
+#[cfg(target_os = "none")]
+use cortex_m::peripheral::{DCB, DWT, SCB, SYST, syst::SystClkSource};
 
-/// Starts the timer's interrupt with a period, us. The counter has 24 bits.
-pub fn start(timer: &mut SYST, period_us: u32, emulated: bool) {
-    let clock_hz = if emulated { board::EMULATED_HZ } else { board::SYSTEM_CLOCK.raw() };
+/// Starts the timer's interrupt, of a clock in Hz, with a period, us. The counter has 24 bits.
+#[cfg(target_os = "none")]
+pub fn start(timer: &mut SYST, clock_hz: u32, period_us: u32) {
     timer.set_clock_source(SystClkSource::Core);
     timer.set_reload(clock_hz / 1_000_000 * period_us - 1);
     timer.clear_current();
@@ -17,14 +17,22 @@ pub fn start(timer: &mut SYST, period_us: u32, emulated: bool) {
 }
 
 /// Starts the cycle counter. QEMU has none: there it reads zero.
+#[cfg(target_os = "none")]
 pub fn start_cycle_counter(debug: &mut DCB, watch: &mut DWT) {
     debug.enable_trace();
     watch.enable_cycle_counter();
 }
 
 /// Processor cycles since the start, modulo 2^32.
+#[cfg(target_os = "none")]
 pub fn cycle_count() -> u32 {
     DWT::cycle_count()
+}
+
+/// Whether the timer has called for the control task, which has not begun yet.
+#[cfg(target_os = "none")]
+pub fn is_pending() -> bool {
+    SCB::is_pendst_pending()
 }
 
 /// Turns of the control task since the start.
@@ -42,13 +50,14 @@ pub struct Turn {
 
 impl Turn {
     /// Begins it.
-    pub fn begin() -> Self {
+    pub fn begin<B: Board>() -> Self {
         TICKS.fetch_add(1, Ordering::Relaxed);
-        Self { began: DWT::cycle_count() }
+        Self { began: B::cycle_count() }
     }
 
     /// Ends it. It is late if the timer has called for the next one already.
-    pub fn end(self) -> Timing {
-        Timing { late: SCB::is_pendst_pending(), cycles: DWT::cycle_count().wrapping_sub(self.began) }
+    pub fn end<B: Board>(self) -> Timing {
+        let cycles = B::cycle_count().wrapping_sub(self.began);
+        Timing { late: B::is_late(), cycles }
     }
 }

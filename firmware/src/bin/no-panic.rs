@@ -5,25 +5,17 @@
 
 #[cfg(target_os = "none")]
 mod proof {
-    use blindgrasp_firmware::board::HandJoints;
-    use blindgrasp_firmware::control::{Control, Timing, task};
-    use blindgrasp_firmware::queue::ControlEnd;
+    use blindgrasp_firmware::Chosen;
+    use blindgrasp_firmware::tasks::ControlTask;
     use core::hint::black_box;
     use core::panic::PanicInfo;
-
-    struct Parts {
-        control: Control,
-        joints: HandJoints,
-        queues: ControlEnd<'static>,
-        last: Timing,
-    }
 
     #[cortex_m_rt::entry]
     fn main() -> ! {
         loop {
             // SAFETY: this is never run.
-            let parts: &mut Parts = unsafe { &mut *black_box(core::ptr::null_mut()) };
-            parts.last = task(&mut parts.control, &mut parts.joints, &mut parts.queues, parts.last);
+            let task: &mut ControlTask<Chosen> = unsafe { &mut *black_box(core::ptr::null_mut()) };
+            task.run();
         }
     }
 

@@ -16,15 +16,15 @@
 #[cfg(target_os = "none")]
 #[rtic::app(device = blindgrasp_firmware::board::pac, peripherals = true)]
 mod app {
-    use blindgrasp_firmware::board::boot::Boot;
-    use blindgrasp_firmware::board::serial::{self, Interrupt, Line};
-    use blindgrasp_firmware::control::{Control, HandBurst};
+    use blindgrasp_firmware::board::serial::{Interrupt, Line};
+    use blindgrasp_firmware::boards::Board;
+    use blindgrasp_firmware::control::Control;
     use blindgrasp_firmware::link::Port;
     use blindgrasp_firmware::model::IMAGE_PIL;
     use blindgrasp_firmware::pil::{Lockstep, Way};
     use blindgrasp_firmware::semihosting::{self, Access, File};
-    use blindgrasp_firmware::{bench, board, report, schedule};
-    use core::mem::MaybeUninit;
+    use blindgrasp_firmware::start::{self, Memory};
+    use blindgrasp_firmware::{Chosen, bench, schedule};
     use cortex_m::peripheral::SYST;
 
     #[shared]
@@ -39,19 +39,13 @@ mod app {
         is_emulated: bool,
     }
 
-    #[init(local = [burst: HandBurst = HandBurst::new(), place: MaybeUninit<Control> = MaybeUninit::uninit()])]
+    #[init(local = [memory: Memory = Memory::new()])]
     fn init(mut cx: init::Context) -> (Shared, Local) {
-        let device = cx.device;
-        let mut boot = Boot::new(device.RCC, &device.DBGMCU, device.FLASH);
-        report::start(&boot, &IMAGE_PIL);
-        let rcc = &mut boot.rcc;
-        let (line_pins, _) = board::pins(device.GPIOA, device.GPIOB, device.GPIOC, rcc);
-        // Nothing here keeps the line waiting, so it needs no DMA.
-        let (interrupt, line, _) = serial::start(device.USART2, None, line_pins, rcc)
-            .expect("the board's baud rate can be had from its clock");
+        let board = Chosen::new(cx.device);
+        let is_emulated = board.found().is_emulated();
+        let (control, line, interrupts) = start::pil(board, &IMAGE_PIL, cx.local.memory);
         schedule::start_cycle_counter(&mut cx.core.DCB, &mut cx.core.DWT);
-        let control = boot.control(&IMAGE_PIL, |_, _| None, cx.local.burst, cx.local.place);
-        (Shared {}, Local { interrupt, line, control, timer: cx.core.SYST, is_emulated: boot.is_emulated() })
+        (Shared {}, Local { interrupt: interrupts.line, line, control, timer: cx.core.SYST, is_emulated })
     }
 
     /// A byte from the line.

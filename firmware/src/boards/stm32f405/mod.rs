@@ -21,10 +21,8 @@ pub mod supply;
 pub mod wiring;
 
 #[cfg(target_os = "none")]
+pub use boot::Stm32f405;
+#[cfg(target_os = "none")]
 pub use stm32f4xx_hal::pac;
 #[cfg(target_os = "none")]
-pub use wiring::*;
-
-/// Flash for saved parameters.
-#[cfg(target_os = "none")]
-pub type SavedFlash = flash::Flash<flash::Mapped>;
+pub use wiring::Buses;

@@ -25,6 +25,7 @@ use crate::joints::dac::{self, CHANNELS};
 use crate::joints::ls7366r::{self, FilterClock};
 use crate::joints::{BoardJoints, JointsConfig, OutputConfig};
 use crate::model::{JOINTS, torques_per_volt_nm_v};
+use blindgrasp_shared::link::rate::FIRST_BAUD;
 use core::array;
 use core::convert::Infallible;
 use core::mem::MaybeUninit;
@@ -51,7 +52,7 @@ pub const EMULATED_HZ: u32 = 168_000_000;
 
 /// The line, baud: 42 MHz / 1 Mbaud = 42 sixteenths of 16 samples, without error. A byte takes 10 us, so a millisecond
 /// has room for 100 bytes each way.
-pub const BAUD: u32 = 1_000_000;
+pub const BAUD: u32 = FIRST_BAUD;
 
 /// The independent watchdog. Its oscillator is between 17 and 47 kHz where 32 are meant (DS8626, LSI oscillator
 /// characteristics), so that this is between 7 and 19 ms: some ticks may be late, but a control task that stands
