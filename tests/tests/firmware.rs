@@ -3,7 +3,7 @@
 //!
 //!     cargo test --release -p blindgrasp-tests --features firmware --test firmware
 
-use blindgrasp_tests::images::{image, root};
+use blindgrasp_tests::images::{DEFAULT_HAND, kept_image, root};
 use blindgrasp_tests::thumb::{Function, Image};
 use object::{Object, ObjectSection, ObjectSymbol, SectionFlags, SectionKind, elf};
 use std::collections::BTreeMap;
@@ -28,7 +28,7 @@ fn elf(kind: &'static str) -> &'static [u8] {
     static HAND: OnceLock<Vec<u8>> = OnceLock::new();
     static PIL: OnceLock<Vec<u8>> = OnceLock::new();
     let cell = if kind == "hand" { &HAND } else { &PIL };
-    cell.get_or_init(|| fs::read(image(kind, "models/hands/three-finger.toml")).expect("an image"))
+    cell.get_or_init(|| fs::read(kept_image(kind, DEFAULT_HAND)).expect("an image"))
 }
 
 /// Flash and static RAM, bytes.
@@ -106,6 +106,19 @@ fn the_stack_is_twice_what_the_interrupts_need() {
     assert!(2 * u64::from(interrupts) < reserved, "{interrupts} of {reserved}");
 }
 
+/// Nothing but the start reads a hand's parameters, and moves them about; the largest hand that the board can have is the worst.
+#[test]
+fn the_stack_has_room_for_the_start_of_a_hand_with_16_joints() {
+    let image = fs::read(kept_image("hand", "models/hands/allegro-like.toml")).expect("an image");
+    let functions = Image::read(&image);
+    let (start, way) = functions.deepest(functions.address("main"));
+    println!("start: {start} bytes of stack, by way of {way:#?}");
+    let file = object::File::parse(&*image).expect("an ELF");
+    let symbol = |name| file.symbols().find(|s| s.name() == Ok(name)).map(|s| s.address());
+    let reserved = symbol("_stack_start").zip(symbol("_stack_end")).map(|(start, end)| start - end);
+    assert!(u64::from(start) < reserved.expect("both ends"), "{start} of {reserved:?}");
+}
+
 /// What an image takes, as it is written down.
 fn measured() -> BTreeMap<String, u64> {
     let mut measured = BTreeMap::new();
@@ -155,7 +168,7 @@ fn an_image_of_the_tick_alone_links_without_a_panic_handler() {
     let output = Command::new("tests/firmware-toolchain")
         .args(["cargo", "build", "--quiet", "--locked", "-p", "blindgrasp-firmware", "--bin", "no-panic"])
         .args(["--features", "no-panic", "--profile", "firmware", "--target", "thumbv7em-none-eabihf"])
-        .env("HAND", "models/hands/three-finger.toml")
+        .env("HAND", DEFAULT_HAND)
         .current_dir(root())
         .output()
         .expect("tests/firmware-toolchain runs");
