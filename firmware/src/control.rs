@@ -42,13 +42,13 @@ pub fn task<B: Board>(
         stored: queues.stored(),
     };
     let outputs = control.turn(joints, &inputs);
-    if let Some(reply) = outputs.reply {
+    if let Some(reply) = outputs.reply.take() {
         queues.answer(queue::Answer { reply, baud: outputs.baud });
     }
     if let Some(form) = outputs.telemetry {
-        queues.tell(Telemetry::Record(outputs.record, form));
+        queues.tell(Telemetry::Record(outputs.record.clone(), form));
     }
-    if let Some(part) = outputs.part {
+    if let Some(part) = outputs.part.take() {
         queues.tell(Telemetry::Part(part));
     }
     if let Some(order) = outputs.order {
@@ -62,12 +62,13 @@ pub struct Control {
     device: Device<JOINTS, FINGERS>,
     /// Too large for a stack.
     burst: &'static mut HandBurst,
+    outputs: Outputs<JOINTS>,
 }
 
 impl Control {
     /// Before the first turn.
     pub fn new(device: Device<JOINTS, FINGERS>, burst: &'static mut HandBurst) -> Self {
-        Self { device, burst }
+        Self { device, burst, outputs: Outputs::none() }
     }
 
     /// The hand.
@@ -76,7 +77,12 @@ impl Control {
     }
 
     /// One turn, as [`Device::turn`] does it.
-    pub fn turn(&mut self, joints: &mut impl Joints<JOINTS>, inputs: &Inputs<JOINTS>) -> Outputs<JOINTS> {
-        self.device.turn(joints, inputs, self.burst)
+    pub fn turn(
+        &mut self,
+        joints: &mut impl Joints<JOINTS>,
+        inputs: &Inputs<JOINTS>,
+    ) -> &mut Outputs<JOINTS> {
+        self.device.turn(joints, inputs, self.burst, &mut self.outputs);
+        &mut self.outputs
     }
 }

@@ -94,9 +94,9 @@ impl<'c, W: Way> Lockstep<'c, W> {
         let began = (self.cycle_count)();
         let outputs = self.control.turn(&mut Remote(sample), &inputs);
         self.cycles = (self.cycle_count)().wrapping_sub(began);
-        let record = Reply::Record(outputs.record);
-        match &outputs.reply {
-            Some(reply) => self.send(&[reply, &record]),
+        let record = Reply::Record(outputs.record.clone());
+        match outputs.reply.take() {
+            Some(reply) => self.send(&[&reply, &record]),
             None => self.send(&[&record]),
         }
     }

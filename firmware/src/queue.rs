@@ -47,7 +47,7 @@ impl Telemetry {
     /// As it is sent. Only the link makes it: the digest of an input record takes time that the control task has not.
     fn reply(self) -> HandReply {
         match self {
-            Self::Record(record, form) => form.of(record),
+            Self::Record(record, form) => form.of(&record),
             Self::Part(part) => Reply::Snapshot(part),
         }
     }

@@ -68,7 +68,7 @@ impl Bench {
     }
 
     fn turn(&mut self, packet: Option<Packet<JOINTS>>) -> Outputs<JOINTS> {
-        self.control.turn(&mut self.joints, &Inputs { packet, ..Inputs::default() })
+        self.control.turn(&mut self.joints, &Inputs { packet, ..Inputs::default() }).clone()
     }
 
     fn turns(&mut self, count: usize) -> Outputs<JOINTS> {

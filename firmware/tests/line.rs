@@ -260,19 +260,21 @@ fn run(way: Way, baud: f64, ticks: u32, load: Load) -> Outcome {
         let packet = request.map(|request| Packet { session, sequence: tick as u16, request });
         let (dropped, waiting) = (control_end.dropped(), control_end.waiting());
         let outputs = control.turn(&mut joints, &Inputs { packet, dropped, waiting, ..Inputs::default() });
-        if let Some(reply) = outputs.reply {
+        if let Some(reply) = outputs.reply.take() {
             if let Reply::Identity { session: given, .. } = reply {
                 session = given;
             }
             control_end.answer(reply.into());
         }
         match load {
-            Load::Everything => control_end.tell(Telemetry::Record(outputs.record, Form::Full(Signals::ALL))),
+            Load::Everything => {
+                control_end.tell(Telemetry::Record(outputs.record.clone(), Form::Full(Signals::ALL)))
+            }
             Load::Asked => {
                 if let Some(form) = outputs.telemetry {
-                    control_end.tell(Telemetry::Record(outputs.record, form));
+                    control_end.tell(Telemetry::Record(outputs.record.clone(), form));
                 }
-                if let Some(part) = outputs.part {
+                if let Some(part) = outputs.part.take() {
                     control_end.tell(Telemetry::Part(part));
                 }
             }

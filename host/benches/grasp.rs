@@ -106,11 +106,11 @@ fn told(criterion: &mut Criterion, record: &Record<J>) {
     for (name, form) in [("full", Form::Full(Signals::ALL)), ("input", Form::Input)] {
         group.bench_function(format!("encode {name}"), |bencher| {
             bencher.iter(|| {
-                let frame = encode(&form.of(black_box(record).clone()), &mut buffer);
+                let frame = encode(&form.of(black_box(record)), &mut buffer);
                 frame.map_or(0, <[u8]>::len)
             });
         });
-        let payload = postcard::to_allocvec(&form.of(record.clone())).expect("a payload");
+        let payload = postcard::to_allocvec(&form.of(record)).expect("a payload");
         group.bench_function(format!("decode {name}"), |bencher| {
             bencher.iter(|| black_box(Reply::<MAX_JOINTS>::decode(black_box(&payload)).expect("a reply")));
         });

@@ -25,7 +25,7 @@ fn said(folder: &Path, duration_s: f64, inputs: bool) -> Vec<Entry> {
     for entry in &mut entries {
         let What::Received(payload) = &mut entry.what else { continue };
         if let (true, Ok(Reply::Record(record))) = (inputs, Reply::<MAX_JOINTS>::decode(payload)) {
-            *payload = postcard::to_allocvec(&Form::Input.of(record)).unwrap();
+            *payload = postcard::to_allocvec(&Form::Input.of(&record)).unwrap();
         }
     }
     entries

@@ -125,7 +125,7 @@ impl Board {
             said.extend(frame(&reply));
         }
         if let Some(form) = outputs.telemetry {
-            said.extend(frame(&form.of(outputs.record)));
+            said.extend(frame(&form.of(&outputs.record)));
         }
         said
     }

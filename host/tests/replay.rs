@@ -9,6 +9,7 @@ use blindgrasp::record::mcap::{Decoder, Recording};
 use blindgrasp::record::replay::{Reason, ReplayError, Report, Wanted, replay};
 use blindgrasp_shared::command::{Command, Grasp};
 use blindgrasp_shared::control::PerGain;
+use blindgrasp_shared::estimate::{Motion, Tracks};
 use blindgrasp_shared::fault::{Fault, Raised};
 use blindgrasp_shared::joints::Reading;
 use blindgrasp_shared::limit::{Limit, LimitConfig};
@@ -270,10 +271,10 @@ fn damping_makes_the_difference_that_the_law_says() {
     let change_nm_s = 0.02 - f64::from(config.laws.hold.damping_nm_s[4]);
     let estimator =
         Params::<MAX_JOINTS, { blindgrasp::MAX_FINGERS }>::new(hand.model.hand.cast(), &config).unwrap();
-    let mut tracks = blindgrasp_shared::estimate::Tracks::new();
+    let (mut tracks, mut motion) = (Tracks::new(), Motion::still());
     let (mut squares, mut largest, mut powered) = (0.0, 0.0_f64, 0_u32);
     for (k, record) in records.iter().enumerate() {
-        let motion = estimator.estimator().update(&mut tracks, &hand.counts(k as u32));
+        estimator.estimator().update(&mut tracks, &hand.counts(k as u32), &mut motion);
         if record.mode != Mode::Disarmed {
             let difference_nm = change_nm_s * f64::from(motion.speeds_rad_s[4]);
             squares += difference_nm * difference_nm;

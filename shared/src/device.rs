@@ -61,6 +61,22 @@ pub struct Outputs<const J: usize> {
     pub order: Option<Order>,
 }
 
+impl<const J: usize> Outputs<J> {
+    /// What there is before the first tick: nothing.
+    pub const fn none() -> Self {
+        Self {
+            torques_nm: [0.0; J],
+            powered: false,
+            record: Record::BLANK,
+            telemetry: None,
+            reply: None,
+            baud: None,
+            part: None,
+            order: None,
+        }
+    }
+}
+
 /// A hand's controller with its link.
 #[derive(Clone, Debug)]
 pub struct Device<const J: usize, const F: usize> {
@@ -123,25 +139,38 @@ impl<const J: usize, const F: usize> Device<J, F> {
         joints: &mut impl Joints<J>,
         inputs: &Inputs<J>,
         burst: &mut Burst<J>,
-    ) -> Outputs<J> {
+        outputs: &mut Outputs<J>,
+    ) {
         let read = joints.collect();
         let reading = self.failed.take().map_or(read, Reading::Failed);
-        let outputs = self.tick(&reading, inputs, burst);
+        self.tick_into(&reading, inputs, burst, outputs);
         if outputs.record.answer == Some(CLEARED) {
             joints.recover();
         }
         self.failed = joints.write(&outputs.torques_nm, outputs.powered);
-        outputs
     }
 
     /// One tick, with its request. Its record goes into the burst, too.
     pub fn tick(&mut self, reading: &Reading<J>, inputs: &Inputs<J>, burst: &mut Burst<J>) -> Outputs<J> {
+        let mut outputs = Outputs::none();
+        self.tick_into(reading, inputs, burst, &mut outputs);
+        outputs
+    }
+
+    /// As [`Self::tick`]; what it gives is written where it stays, since a record takes long to move.
+    pub fn tick_into(
+        &mut self,
+        reading: &Reading<J>,
+        inputs: &Inputs<J>,
+        burst: &mut Burst<J>,
+        outputs: &mut Outputs<J>,
+    ) {
         self.session.quiet_ticks = self.session.quiet_ticks.saturating_add(1);
         let asked = match &inputs.packet {
             Some(packet) => self.ask(packet, reading, burst),
             None => Asked::Nothing,
         };
-        let order = self.save(inputs.stored);
+        outputs.order = self.save(inputs.stored);
         let heartbeat = matches!(asked, Asked::Heartbeat { .. });
         let command = match asked {
             Asked::Command { command, .. } => Some(command),
@@ -166,36 +195,36 @@ impl<const J: usize, const F: usize> Device<J, F> {
                 .with(Event::Unconfirmed, !self.is_confirmed),
             command,
         };
-        let mut output = tick::tick(&self.params, &mut self.state, &input);
-        output.record.cycles = inputs.cycles;
-        output.record.dropped = inputs.dropped;
-        burst.take(&output.record);
-        let part = self.part(output.record.tick, inputs.waiting);
-        let telemetry = self.telemetry.due(inputs.waiting);
-        output.record.decimation = self.telemetry.told_every();
-        if telemetry.is_some() {
-            output.record.sequence = self.telemetry.sent;
+        let record = &mut outputs.record;
+        tick::tick_into(&self.params, &mut self.state, &input, record);
+        record.cycles = inputs.cycles;
+        record.dropped = inputs.dropped;
+        burst.take(record);
+        outputs.torques_nm = *self.state.torques_nm();
+        self.params.config().motors.turn(&mut outputs.torques_nm);
+        outputs.powered = record.mode.is_powered();
+        outputs.part = self.part(record.tick, inputs.waiting);
+        outputs.telemetry = self.telemetry.due(inputs.waiting);
+        record.decimation = self.telemetry.told_every();
+        if outputs.telemetry.is_some() {
+            record.sequence = self.telemetry.sent;
             self.telemetry.sent = self.telemetry.sent.wrapping_add(1);
         }
-        let baud = match asked {
+        outputs.baud = match asked {
             Asked::Rate { baud, .. } => Some(baud),
             _ => None,
         };
-        let reply = match asked {
-            Asked::Nothing if inputs.no_room => None,
-            Asked::Nothing => self.saved.take(),
-            Asked::Answered(reply) => Some(reply),
+        match asked {
+            Asked::Nothing => outputs.reply = if inputs.no_room { None } else { self.saved.take() },
+            Asked::Answered(reply) => outputs.reply = Some(reply),
             Asked::Heartbeat { sequence } | Asked::Rate { sequence, .. } => {
-                Some(Reply::Answer { sequence, refused: None })
+                outputs.reply = Some(Reply::Answer { sequence, refused: None });
             }
             Asked::Command { sequence, .. } => {
-                let refused = output.record.answer.and_then(|answer| answer.refused);
-                Some(Reply::Answer { sequence, refused })
+                let refused = record.answer.and_then(|answer| answer.refused);
+                outputs.reply = Some(Reply::Answer { sequence, refused });
             }
-        };
-        let tick::Output { mut torques_nm, powered, record } = output;
-        self.params.config().motors.turn(&mut torques_nm);
-        Outputs { torques_nm, powered, record, telemetry, reply, baud, part, order }
+        }
     }
 
     /// Goes on with a save, if there is one, once the store has done what it was told before.

@@ -244,15 +244,14 @@ impl<const J: usize> Motion<J> {
 }
 
 impl<const J: usize> Estimator<J> {
-    /// Takes the counts of this tick.
-    pub fn update(&self, tracks: &mut Tracks<J>, counts: &[i32; J]) -> Motion<J> {
+    /// Takes the counts of this tick to the motion.
+    pub fn update(&self, tracks: &mut Tracks<J>, counts: &[i32; J], motion: &mut Motion<J>) {
         if !tracks.started {
             tracks.started = true;
             for (track, &count) in tracks.tracks.iter_mut().zip(counts) {
                 *track = Track { count, play: 0.0, ahead: 0.0, speed: 0.0 };
             }
         }
-        let mut motion = Motion::still();
         for k in 0..self.joint_count.min(J) {
             let (scale, track) = (&self.scales[k], &mut tracks.tracks[k]);
             let moved = track.follow(self.keep, self.beta, counts[k]);
@@ -262,7 +261,6 @@ impl<const J: usize> Estimator<J> {
                 (track.count.wrapping_sub(scale.zero_count) as f32 + track.ahead) * scale.rad;
             motion.speeds_rad_s[k] = track.speed * scale.rad_s;
         }
-        motion
     }
 
     /// Delay `D` of the speed, s.
@@ -325,7 +323,13 @@ mod tests {
 
     fn run(estimator: &Estimator<1>, counts: impl Iterator<Item = i32>) -> Vec<Motion<1>> {
         let mut tracks = Tracks::new();
-        counts.map(|count| estimator.update(&mut tracks, &[count])).collect()
+        let mut motion = Motion::still();
+        counts
+            .map(|count| {
+                estimator.update(&mut tracks, &[count], &mut motion);
+                motion.clone()
+            })
+            .collect()
     }
 
     /// Root of the mean square of `speed - true speed`, after the filter has settled.
@@ -428,12 +432,14 @@ mod tests {
     fn the_first_sample_starts_it_at_rest() {
         let estimator = estimator(100.0, 1000, true);
         let mut tracks = Tracks::new();
-        let motion = estimator.update(&mut tracks, &[400]);
+        let mut motion = Motion::still();
+        estimator.update(&mut tracks, &[400], &mut motion);
         assert_eq!(motion.speeds_rad_s, [0.0]);
         assert_eq!(motion.count_changes, [0]);
         assert!((motion.angles_rad[0] - 600.0 * RAD_PER_COUNT as f32).abs() < 1e-6);
         tracks.restart();
-        assert_eq!(estimator.update(&mut tracks, &[90_000]).count_changes, [0]);
+        estimator.update(&mut tracks, &[90_000], &mut motion);
+        assert_eq!(motion.count_changes, [0]);
     }
 
     #[test]

@@ -42,7 +42,7 @@ pub struct Entry<'a, const J: usize> {
     /// Torques of the tick before, N m.
     pub last_nm: &'a [f32; J],
     /// What the laws do in this tick; `None` without torque.
-    pub law: Option<Account<f32>>,
+    pub law: Option<&'a Account<f32>>,
     /// The tick period, s.
     pub period_s: f32,
 }
@@ -129,16 +129,16 @@ impl<const J: usize> Ledger<J> {
         work *= half;
         self.work.add(work);
         // The weight is held or not: its gain is one.
-        let (terms, weight) = entry.law.as_ref().map_or((PerGain::all(Term::NONE), Term::NONE), |law| {
+        let (terms, weight) = entry.law.map_or((PerGain::all(Term::NONE), Term::NONE), |law| {
             let terms =
                 law.gains.zip_with(&law.potentials_j, |&gain, &potential_j| Term { gain, potential_j });
             (terms, Term::new(1.0, -law.weight_potential_j))
         });
-        let pairs = terms.iter().chain([&weight]).zip(self.terms.iter().chain([&self.weight]));
-        let drop = pairs.fold(0.0, |drop, (now, before)| drop + now.drop_since(before));
+        let drops = terms.zip_with(&self.terms, Term::drop_since);
+        let drop = drops.iter().fold(0.0, |sum, drop| sum + drop) + weight.drop_since(&self.weight);
         (self.terms, self.weight) = (terms, weight);
         match entry.law {
-            Some(Account { damping_w, .. }) => {
+            Some(&Account { damping_w, .. }) => {
                 self.damped.add(damping_w * entry.period_s);
                 // A first-order fade with a time constant of one second.
                 self.excess_j += work - drop - self.excess_j * entry.period_s;
@@ -222,6 +222,7 @@ mod tests {
     /// Enters a tick of one joint.
     fn enter(ledger: &mut Ledger<1>, moved_rad: f32, last_nm: f32, law: Option<Account<f32>>) {
         let motion = Motion { moved_rad: [moved_rad], ..Motion::still() };
+        let law = law.as_ref();
         ledger.enter(&Entry { motion: &motion, last_nm: &[last_nm], law, period_s: PERIOD_S });
     }
 

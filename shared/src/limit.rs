@@ -140,13 +140,17 @@ pub struct Limits<const J: usize> {
     joints: [JointLimits; J],
 }
 
-/// The limits of one joint.
+/// The limits of one joint. What is not limited has an infinite limit.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct JointLimits {
-    torque_nm: Option<f32>,
+    torque_nm: f32,
     /// Largest change of the torque in a tick, N m.
-    slew_nm: Option<f32>,
-    stop: Option<Stop>,
+    slew_nm: f32,
+    stop: Stop,
+}
+
+impl JointLimits {
+    const NONE: Self = Self { torque_nm: f32::INFINITY, slew_nm: f32::INFINITY, stop: Stop::NONE };
 }
 
 /// The soft end stops of one joint.
@@ -179,7 +183,7 @@ impl<const J: usize> LimitConfig<J> {
             }
         }
         let joint_count = hand.joint_count().min(J);
-        let mut joints = [JointLimits { torque_nm: None, slew_nm: None, stop: None }; J];
+        let mut joints = [JointLimits::NONE; J];
         for (k, joint) in joints.iter_mut().enumerate().take(joint_count) {
             let of_joint = JointConfig {
                 joint: k,
@@ -220,14 +224,14 @@ impl JointConfig {
     fn prepare(&self, period: Period) -> Result<JointLimits, ParameterError> {
         let positive = |value: Option<f32>, parameter| match value {
             Some(value) if !is_positive(value) => self.fail(parameter, "has to be positive"),
-            value => Ok(value),
+            value => Ok(value.unwrap_or(f32::INFINITY)),
         };
         Ok(JointLimits {
             torque_nm: positive(self.torque_nm, "limits.torque_nm")?,
-            slew_nm: positive(self.slew_nm_s, "limits.slew_nm_s")?.map(|slew| slew * period.seconds()),
+            slew_nm: positive(self.slew_nm_s, "limits.slew_nm_s")? * period.seconds(),
             stop: match &self.stop {
-                Some(stop) => Some(self.prepare_stop(stop)?),
-                None => None,
+                Some(stop) => self.prepare_stop(stop)?,
+                None => Stop::NONE,
             },
         })
     }
@@ -279,15 +283,14 @@ impl<const J: usize> Limits<J> {
         angles_rad: &[f32; J],
         speeds_rad_s: &[f32; J],
         last_nm: &[f32; J],
-        wanted_nm: &[f32; J],
-    ) -> ([f32; J], [Limiting; J]) {
-        let mut torques = [0.0; J];
+        torques_nm: &mut [f32; J],
+    ) -> [Limiting; J] {
         let mut limiting = [Limiting::NONE; J];
         for k in 0..self.joint_count.min(J) {
-            (torques[k], limiting[k]) =
-                self.joints[k].apply(angles_rad[k], speeds_rad_s[k], last_nm[k], wanted_nm[k]);
+            (torques_nm[k], limiting[k]) =
+                self.joints[k].apply(angles_rad[k], speeds_rad_s[k], last_nm[k], torques_nm[k]);
         }
-        (torques, limiting)
+        limiting
     }
 }
 
@@ -295,27 +298,22 @@ impl JointLimits {
     fn apply(&self, angle_rad: f32, speed_rad_s: f32, last_nm: f32, wanted_nm: f32) -> (f32, Limiting) {
         let mut torque = wanted_nm;
         let mut limiting = Limiting::NONE;
-        if let Some(stop) = &self.stop {
-            // The lower stop is the upper one in a mirror.
-            let (into_upper, into_lower) = (angle_rad - stop.upper_rad, stop.lower_rad - angle_rad);
-            if into_upper > 0.0 {
-                torque = stop.hold_back(into_upper, speed_rad_s, torque);
-                limiting.insert(Limit::UpperStop);
-            } else if into_lower > 0.0 {
-                torque = -stop.hold_back(into_lower, -speed_rad_s, -torque);
-                limiting.insert(Limit::LowerStop);
-            }
+        let Self { torque_nm: limit, slew_nm: step, stop } = self;
+        // The lower stop is the upper one in a mirror.
+        let (into_upper, into_lower) = (angle_rad - stop.upper_rad, stop.lower_rad - angle_rad);
+        if into_upper > 0.0 {
+            torque = stop.hold_back(into_upper, speed_rad_s, torque);
+            limiting.insert(Limit::UpperStop);
+        } else if into_lower > 0.0 {
+            torque = -stop.hold_back(into_lower, -speed_rad_s, -torque);
+            limiting.insert(Limit::LowerStop);
         }
-        if let Some(limit) = self.torque_nm
-            && torque.magnitude() > limit
-        {
-            torque = torque.limited(-limit, limit);
+        if torque.magnitude() > *limit {
+            torque = torque.limited(-limit, *limit);
             limiting.insert(Limit::Torque);
         }
-        if let Some(step) = self.slew_nm
-            && (torque - last_nm).magnitude() > step
-        {
-            torque = last_nm + (torque - last_nm).limited(-step, step);
+        if (torque - last_nm).magnitude() > *step {
+            torque = last_nm + (torque - last_nm).limited(-step, *step);
             limiting.insert(Limit::Slew);
         }
         (torque, limiting)
@@ -323,6 +321,14 @@ impl JointLimits {
 }
 
 impl Stop {
+    const NONE: Self = Self {
+        lower_rad: f32::NEG_INFINITY,
+        upper_rad: f32::INFINITY,
+        per_margin: 0.0,
+        stiffness_nm_rad: 0.0,
+        damping_nm_s: 0.0,
+    };
+
     /// The torque at a depth into the margin; positive torque and speed are towards the end.
     fn hold_back(&self, depth_rad: f32, speed_rad_s: f32, torque_nm: f32) -> f32 {
         let share = (depth_rad * self.per_margin).limited(0.0, 1.0);

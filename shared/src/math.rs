@@ -97,6 +97,12 @@ impl Real for f32 {
         libm::sqrtf(self)
     }
 
+    // One instruction; with the comparison, the sign of a zero would have to be kept.
+    #[inline]
+    fn magnitude(self) -> f32 {
+        self.abs()
+    }
+
     #[inline]
     fn from_f64(value: f64) -> f32 {
         value as f32

@@ -221,6 +221,18 @@ pub fn tick<const J: usize, const F: usize>(
     state: &mut State<J, F>,
     input: &Input<'_, J>,
 ) -> Output<J> {
+    let mut record = Record::BLANK;
+    tick_into(params, state, input, &mut record);
+    Output { torques_nm: state.torques_nm, powered: record.mode.is_powered(), record }
+}
+
+/// One tick, whose record is written where it stays. Its torques are in the state.
+pub(crate) fn tick_into<const J: usize, const F: usize>(
+    params: &Params<J, F>,
+    state: &mut State<J, F>,
+    input: &Input<'_, J>,
+    record: &mut Record<J>,
+) {
     let sensed = sense(params, state, &input.sensed);
     let fault = watch(params, state, input, sensed);
     let objection = input.command.and_then(|command| object(params, state, input.events, command));
@@ -236,7 +248,7 @@ pub fn tick<const J: usize, const F: usize>(
     state.ledger.enter(&Entry {
         motion: &state.motion,
         last_nm: &state.torques_nm,
-        law: action.account,
+        law: action.account.as_ref(),
         period_s: params.prepared.period_s,
     });
     if !grasped && state.latch.is_some() {
@@ -261,7 +273,7 @@ pub fn tick<const J: usize, const F: usize>(
         Sensed::Tested { raised, counts } => (List::first_of(*counts, joint_count), Some(raised)),
     };
     let account = action.account.unwrap_or(Account::none());
-    let record = Record {
+    *record = Record {
         sequence: state.ticks,
         tick: state.ticks,
         mode: state.supervisor.mode(),
@@ -284,7 +296,6 @@ pub fn tick<const J: usize, const F: usize>(
         limiting: List::first_of(action.limiting, joint_count),
     };
     state.ticks = state.ticks.wrapping_add(1);
-    Output { torques_nm: action.torques_nm, powered: record.mode.is_powered(), record }
 }
 
 /// Updates the motion; the fault of the reading or of what it shows.
@@ -294,7 +305,9 @@ fn sense<const J: usize, const F: usize>(
     sensed: &Sensed<'_, J>,
 ) -> Option<Raised> {
     match *sensed {
-        Sensed::Counts(counts) => state.motion = params.prepared.estimator.update(&mut state.tracks, counts),
+        Sensed::Counts(counts) => {
+            params.prepared.estimator.update(&mut state.tracks, counts, &mut state.motion);
+        }
         Sensed::Ideal { angles_rad, speeds_rad_s } => {
             let last_rad = &state.motion.angles_rad;
             let moved_rad = core::array::from_fn(|k| {
@@ -311,7 +324,7 @@ fn sense<const J: usize, const F: usize>(
             return Some(raised);
         }
         Sensed::Tested { raised, counts } => {
-            state.motion = params.prepared.estimator.update(&mut state.tracks, counts);
+            params.prepared.estimator.update(&mut state.tracks, counts, &mut state.motion);
             // Once the hand is in its fault, that they failed is no cause to stay there; what they would begin with may be.
             if state.mode() != Mode::Fault {
                 return Some(raised);
@@ -426,10 +439,11 @@ fn act<const J: usize, const F: usize>(params: &Params<J, F>, state: &mut State<
             }),
         }),
     };
-    let (wanted_nm, account) = params.prepared.laws.torques(&stance, speeds_rad_s, grip.as_ref());
-    let (torques_nm, limiting) =
-        params.prepared.limits.apply(angles_rad, speeds_rad_s, &state.torques_nm, &wanted_nm);
+    let Prepared { laws, limits, watch, .. } = &params.prepared;
+    let (mut torques_nm, account) = laws.torques(&stance, speeds_rad_s, grip.as_ref());
     // A limit makes an infinite torque finite: both sides of it are looked at.
-    let not_finite = params.prepared.watch.torques(&wanted_nm).or(params.prepared.watch.torques(&torques_nm));
+    let wanted = watch.torques(&torques_nm);
+    let limiting = limits.apply(angles_rad, speeds_rad_s, &state.torques_nm, &mut torques_nm);
+    let not_finite = wanted.or(watch.torques(&torques_nm));
     Action { torques_nm, limiting, not_finite, account: Some(account) }
 }

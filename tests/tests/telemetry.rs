@@ -140,7 +140,7 @@ impl Line {
             }
         }
         if let Some(form) = outputs.telemetry
-            && self.tell(form.of(outputs.record.clone()))
+            && self.tell(form.of(&outputs.record))
         {
             self.computed.push_back(outputs.record.clone());
         }

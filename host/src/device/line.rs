@@ -99,7 +99,7 @@ impl Line {
     /// is counted.
     pub fn post(&mut self, outputs: Outputs<MAX_JOINTS>) {
         self.answers.extend(outputs.reply);
-        let record = outputs.telemetry.map(|form| form.of(outputs.record));
+        let record = outputs.telemetry.map(|form| form.of(&outputs.record));
         for telemetry in record.into_iter().chain(outputs.part.map(Reply::Snapshot)) {
             if self.records.len() < WAITING_MOST {
                 self.records.push_back(telemetry);

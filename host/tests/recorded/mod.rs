@@ -233,7 +233,7 @@ impl Session {
                 torques[joint] = f32::from_bits(torques[joint].to_bits() ^ 1 << bit);
                 record.torques_nm = blindgrasp_shared::telemetry::List::first_of(torques, told.len());
             }
-            let frame = encode(&form.of(record), &mut self.buffer).unwrap().to_vec();
+            let frame = encode(&form.of(&record), &mut self.buffer).unwrap().to_vec();
             if fate != Fate::IsLost {
                 self.arrived += 1;
                 self.arrive(&frame);
@@ -325,7 +325,7 @@ pub(crate) fn simulation(
             Told::Ideal => Input::ideal(&angles, &speeds, command),
         };
         let record = tick(&params, &mut state, &input).record;
-        let frame = encode(&Form::Full(signals).of(record.clone()), &mut buffer).unwrap().to_vec();
+        let frame = encode(&Form::Full(signals).of(&record), &mut buffer).unwrap().to_vec();
         let mut receiver = Receiver::<1024>::new();
         for byte in frame {
             if let Some(payload) = receiver.push(byte) {

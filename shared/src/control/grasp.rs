@@ -108,6 +108,8 @@ impl<T: Real, const J: usize, const F: usize> Law<T, J, F, 2, 0> for GraspLaw<T>
         Latch { attitudes: posture.attitudes }
     }
 
+    // Not inlined: with all that surrounds it, the compiler would run out of registers.
+    #[inline(never)]
     fn torques(
         &self,
         stance: &Stance<'_, T, J, F>,

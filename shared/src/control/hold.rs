@@ -33,15 +33,16 @@ impl<T: Real, const J: usize> Hold<T, J> {
         Ok(())
     }
 
-    /// Returns the torques of the damping, N m.
-    pub(super) fn damping_nm(&self, speeds_rad_s: &[T; J]) -> [T; J] {
-        core::array::from_fn(|k| -(self.damping_nm_s[k] * speeds_rad_s[k]))
-    }
-
-    /// Returns the power that the damping takes, `dq^T C dq`, W.
-    pub fn damping_power_w(&self, speeds_rad_s: &[T; J]) -> T {
-        let joints = self.damping_nm_s.iter().zip(speeds_rad_s);
-        joints.fold(T::zero(), |sum, (damping, speed)| sum + *damping * *speed * *speed)
+    /// Sets the torques to those of the damping, N m. Returns the power that it takes, `dq^T C dq`, W.
+    // Not inlined: the compiler would do half of it at the end, and keep all speeds for that.
+    #[inline(never)]
+    pub(super) fn damp(&self, speeds_rad_s: &[T; J], torques_nm: &mut [T; J]) -> T {
+        let mut power_w = T::zero();
+        for ((torque, damping), speed) in torques_nm.iter_mut().zip(&self.damping_nm_s).zip(speeds_rad_s) {
+            *torque = -(*damping * *speed);
+            power_w -= *torque * *speed;
+        }
+        power_w
     }
 
     /// Adds what holds the links' weight to the torques, N m. Returns the potential energy of that weight above some

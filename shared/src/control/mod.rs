@@ -396,13 +396,12 @@ impl<T: Real, const J: usize> Laws<T, J> {
         grip: Option<&Grip<'_, T, J, F>>,
     ) -> ([T; J], Account<T>) {
         let hold = &self.config.hold;
-        let mut torques = hold.damping_nm(speeds_rad_s);
-        let mut account = Account::none();
+        let (mut torques, mut account) = ([T::zero(); J], Account::none());
+        account.damping_w = hold.damp(speeds_rad_s, &mut torques);
         if let Some(grip) = grip {
             self.grasp_torques(stance, grip, &mut torques, &mut account);
         }
         account.weight_potential_j = hold.hold_weight(stance.hand, stance.posture, &mut torques);
-        account.damping_w = hold.damping_power_w(speeds_rad_s);
         (torques, account)
     }
 }

@@ -92,17 +92,17 @@ impl<const J: usize> FaultConfig<J> {
             if let Some(speeds) = self.possible_speed_rad_s {
                 let speed = positive("faults.possible_speed_rad_s", speeds[k])?;
                 // A count more, because both ends of the tick are rounded to whole counts.
-                joint.change = Some(speed / estimator.rad_s(k) + 1.0);
+                joint.change = speed / estimator.rad_s(k) + 1.0;
             }
             if let Some(speeds) = self.speed_limit_rad_s {
-                joint.speed_rad_s = Some(positive("faults.speed_limit_rad_s", speeds[k])?);
+                joint.speed_rad_s = positive("faults.speed_limit_rad_s", speeds[k])?;
             }
             if let Some(torques) = &self.frozen_torque_nm {
-                joint.frozen_nm = Some(positive("faults.frozen_torque_nm", torques[k])?);
+                joint.frozen_nm = positive("faults.frozen_torque_nm", torques[k])?;
             }
             if let Some(slack) = self.range_slack_rad {
                 let (lower, upper) = hand.range_rad(k);
-                joint.range_rad = Some((lower - slack, upper + slack));
+                (joint.lower_rad, joint.upper_rad) = (lower - slack, upper + slack);
             }
         }
         if self.energy_j.is_some_and(|energy| !(energy > 0.0 && energy.is_finite())) {
@@ -115,11 +115,11 @@ impl<const J: usize> FaultConfig<J> {
         }
         for k in 0..joint_count {
             let parent = hand.parent(k);
-            if let Some(joint) = joints.get_mut(k) {
+            if let (Some(joint), Some(parent)) = (joints.get_mut(k), parent) {
                 joint.before = parent;
             }
             if let Some(joint) = parent.and_then(|parent| joints.get_mut(parent)) {
-                joint.after = Some(k);
+                joint.after = k;
             }
         }
         let ticks = |time: Option<u32>, parameter| match time {
@@ -193,20 +193,24 @@ struct Standstill {
     after_rad: f32,
 }
 
-/// Where the faults of one joint begin.
+/// Where the faults of one joint begin. What is left out begins beyond all finite numbers.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct JointWatch {
     /// Change of the count in a tick.
-    change: Option<f32>,
-    speed_rad_s: Option<f32>,
-    range_rad: Option<(f32, f32)>,
+    change: f32,
+    speed_rad_s: f32,
+    lower_rad: f32,
+    upper_rad: f32,
     /// Change of torque that is too much for a joint that stands still, N m.
-    frozen_nm: Option<f32>,
-    /// The joint that carries it.
-    before: Option<usize>,
-    /// A joint that it carries; of several, the last.
-    after: Option<usize>,
+    frozen_nm: f32,
+    /// The joint that carries it, or [`NO_JOINT`].
+    before: usize,
+    /// A joint that it carries; of several, the last; or [`NO_JOINT`].
+    after: usize,
 }
+
+/// No hand has a joint of this number.
+const NO_JOINT: usize = usize::MAX;
 
 impl<const J: usize> Watched<J> {
     /// Nothing has happened yet.
@@ -280,18 +284,26 @@ impl<const J: usize> Watch<J> {
 
     /// The first joint whose torque is not a finite number.
     pub fn torques(&self, torques_nm: &[f32; J]) -> Option<Raised> {
+        // Zero times what is not finite is no number, and then the sum is none: one comparison for all.
+        if torques_nm.iter().fold(0.0, |sum, torque| sum + 0.0 * torque) == 0.0 {
+            return None;
+        }
         let joint = torques_nm.iter().take(self.joint_count).position(|torque| !torque.is_finite())?;
         Some(Raised::at(joint, Fault::NotFinite))
     }
 
     /// Counts for how many ticks each joint has been at its torque limit; the first that was for too long.
     pub fn saturation(&self, watched: &mut Watched<J>, limiting: &[Limiting; J]) -> Option<Raised> {
-        for (ticks, limiting) in watched.saturated.iter_mut().zip(limiting) {
+        let longest = self.saturated_ticks.unwrap_or(u32::MAX);
+        let mut saturated = None;
+        let joints = watched.saturated.iter_mut().zip(limiting).take(self.joint_count);
+        for (k, (ticks, limiting)) in joints.enumerate() {
             *ticks = if limiting.contains(Limit::Torque) { ticks.saturating_add(1) } else { 0 };
+            if *ticks > longest {
+                saturated = saturated.or(Some(Raised::at(k, Fault::SaturatedTooLong)));
+            }
         }
-        let longest = self.saturated_ticks?;
-        let joint = watched.saturated.iter().take(self.joint_count).position(|&ticks| ticks > longest)?;
-        Some(Raised::at(joint, Fault::SaturatedTooLong))
+        saturated
     }
 
     /// Counts the ticks since the last heartbeat; whether it fails.
@@ -336,9 +348,7 @@ impl<const J: usize> Watch<J> {
         let mut frozen = None;
         for k in 0..self.joint_count.min(J) {
             let (joint, standstill) = (&self.joints[k], &mut watched.standstills[k]);
-            let angle_of = |neighbour: Option<usize>| {
-                neighbour.and_then(|k| motion.angles_rad.get(k)).copied().unwrap_or(0.0)
-            };
+            let angle_of = |neighbour: usize| motion.angles_rad.get(neighbour).copied().unwrap_or(0.0);
             let (torque_nm, before_rad, after_rad) =
                 (torques_nm[k], angle_of(joint.before), angle_of(joint.after));
             if motion.count_changes[k] != 0 || driven == Driven::Otherwise {
@@ -349,8 +359,7 @@ impl<const J: usize> Watch<J> {
             if driven == Driven::Ramp {
                 standstill.torque_nm = torque_nm;
             }
-            let changed =
-                joint.frozen_nm.is_some_and(|most| (torque_nm - standstill.torque_nm).magnitude() > most);
+            let changed = (torque_nm - standstill.torque_nm).magnitude() > joint.frozen_nm;
             let dragged = (before_rad - standstill.before_rad).magnitude() > self.neighbour_rad
                 || (after_rad - standstill.after_rad).magnitude() > self.neighbour_rad;
             if changed && dragged && standstill.ticks > longest {
@@ -363,26 +372,35 @@ impl<const J: usize> Watch<J> {
 
 impl JointWatch {
     /// Everything is left out.
-    const OFF: Self =
-        Self { change: None, speed_rad_s: None, range_rad: None, frozen_nm: None, before: None, after: None };
+    const OFF: Self = Self {
+        change: f32::MAX,
+        speed_rad_s: f32::MAX,
+        lower_rad: f32::MIN,
+        upper_rad: f32::MAX,
+        frozen_nm: f32::INFINITY,
+        before: NO_JOINT,
+        after: NO_JOINT,
+    };
 
     fn motion(&self, angle_rad: f32, speed_rad_s: f32, count_change: u32) -> Option<Fault> {
-        if !(angle_rad.is_finite() && speed_rad_s.is_finite()) {
-            return Some(Fault::NotFinite);
-        }
         let change = count_change as f32;
-        if self.change.is_some_and(|largest| change > largest) {
-            return Some(Fault::CountJump);
+        let in_range = angle_rad >= self.lower_rad && angle_rad <= self.upper_rad;
+        // What is not finite is not within limits that are.
+        if change <= self.change && in_range && speed_rad_s.magnitude() <= self.speed_rad_s {
+            return None;
         }
-        if self.range_rad.is_some_and(|(lower, upper)| angle_rad < lower || angle_rad > upper) {
-            return Some(Fault::BeyondRange);
-        }
-        if self.speed_rad_s.is_some_and(|largest| speed_rad_s.magnitude() > largest) {
-            return Some(Fault::Overspeed);
-        }
-        None
+        Some(if !(angle_rad.is_finite() && speed_rad_s.is_finite()) {
+            Fault::NotFinite
+        } else if change > self.change {
+            Fault::CountJump
+        } else if !in_range {
+            Fault::BeyondRange
+        } else {
+            Fault::Overspeed
+        })
     }
 }
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -402,9 +420,10 @@ mod tests {
     #[test]
     fn each_fault_of_the_motion_begins_where_it_is_set() {
         let watch = JointWatch {
-            change: Some(600.0),
-            speed_rad_s: Some(20.0),
-            range_rad: Some((-1.0, 2.0)),
+            change: 600.0,
+            speed_rad_s: 20.0,
+            lower_rad: -1.0,
+            upper_rad: 2.0,
             ..JointWatch::OFF
         };
         assert_eq!(watch.motion(2.0, 20.0, 600), None);
@@ -485,8 +504,8 @@ mod tests {
     fn a_counter_is_frozen_when_torque_and_neighbour_change_and_it_does_not() {
         use Driven::{Otherwise, Ramp, Steadily};
         let joints = [
-            JointWatch { frozen_nm: Some(0.1), after: Some(1), ..JointWatch::OFF },
-            JointWatch { frozen_nm: Some(0.1), before: Some(0), ..JointWatch::OFF },
+            JointWatch { frozen_nm: 0.1, after: 1, ..JointWatch::OFF },
+            JointWatch { frozen_nm: 0.1, before: 0, ..JointWatch::OFF },
         ];
         let watch = Watch { joints, frozen_ticks: Some(20), neighbour_rad: 0.03, ..BLIND };
         let mut watched = Watched::new();

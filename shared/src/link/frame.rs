@@ -35,16 +35,12 @@ pub fn encode<'a, M: Serialize + ?Sized>(
 fn stuff(buffer: &mut [u8], mut end: usize) -> Result<&[u8], BufferTooSmall> {
     let mut code_at = 0;
     loop {
-        let block = buffer.get_mut(code_at..end).ok_or(BufferTooSmall)?;
-        let (mut code, bytes) = block.split_first_mut().ok_or(BufferTooSmall)?;
+        // A code, and as many bytes as it can count.
+        let window_end = end.min(code_at + usize::from(FULL));
+        let window = buffer.get_mut(code_at..window_end).ok_or(BufferTooSmall)?;
+        let (mut code, bytes) = window.split_first_mut().ok_or(BufferTooSmall)?;
         let mut length = 1_u8;
-        let mut full_at = None;
-        for (at, byte) in (code_at + 1..).zip(bytes) {
-            // Only now that a byte follows: a full block at the end has no other behind it.
-            if length == FULL {
-                full_at = Some(at);
-                break;
-            }
+        for byte in bytes {
             if *byte == 0 {
                 *code = length;
                 (code, length) = (byte, 1);
@@ -53,12 +49,19 @@ fn stuff(buffer: &mut [u8], mut end: usize) -> Result<&[u8], BufferTooSmall> {
             }
         }
         *code = length;
-        let Some(at) = full_at else { break };
+        if window_end == end {
+            // A full block at the end has no other behind it.
+            break;
+        }
+        if length < FULL {
+            code_at = window_end - usize::from(length);
+            continue;
+        }
         if end >= buffer.len() {
             return Err(BufferTooSmall);
         }
-        buffer.copy_within(at..end, at + 1);
-        (code_at, end) = (at, end + 1);
+        buffer.copy_within(window_end..end, window_end + 1);
+        (code_at, end) = (window_end, end + 1);
     }
     *buffer.get_mut(end).ok_or(BufferTooSmall)? = END;
     buffer.get(..=end).ok_or(BufferTooSmall)

@@ -97,7 +97,7 @@ mod tests {
     #[test]
     fn each_stands_for_itself() {
         let mut buffer = [0; 64];
-        let reply = Form::Input.of(record());
+        let reply = Form::Input.of(&record());
         let bytes = postcard::to_slice(&reply, &mut buffer).unwrap();
         assert_eq!(Reply::decode(bytes), Ok(reply));
     }

@@ -180,13 +180,14 @@ pub enum Form {
 
 impl Form {
     /// Returns the reply that tells of a tick.
-    pub fn of<const J: usize>(self, mut record: Record<J>) -> Reply<'static, J> {
+    pub fn of<const J: usize>(self, record: &Record<J>) -> Reply<'static, J> {
         match self {
             Self::Full(signals) => {
+                let mut record = record.clone();
                 record.keep(signals);
                 Reply::Record(record)
             }
-            Self::Input => Reply::Input(InputRecord::of(&record)),
+            Self::Input => Reply::Input(InputRecord::of(record)),
         }
     }
 }

@@ -55,6 +55,11 @@ impl<const J: usize, const F: usize> State<J, F> {
         &self.motion.speeds_rad_s
     }
 
+    /// Torques of the next tick, N m.
+    pub fn torques_nm(&self) -> &[f32; J] {
+        &self.torques_nm
+    }
+
     /// The mode.
     pub fn mode(&self) -> Mode {
         self.supervisor.mode()

@@ -7,7 +7,7 @@ use super::reader::{Entry, What};
 use super::{RecordingError, Stamp};
 use crate::MAX_JOINTS;
 use blindgrasp_shared::command::Answer;
-use blindgrasp_shared::estimate::{Estimator, Tracks};
+use blindgrasp_shared::estimate::{Estimator, Motion, Tracks};
 use blindgrasp_shared::link::InputRecord;
 use blindgrasp_shared::link::message::Reply;
 use blindgrasp_shared::period::Period;
@@ -247,7 +247,8 @@ impl Track {
         }
         let mut all = [0; MAX_JOINTS];
         all[..joints].copy_from_slice(counts);
-        let motion = estimator.update(&mut self.tracks, &all);
+        let mut motion = Motion::still();
+        estimator.update(&mut self.tracks, &all, &mut motion);
         decoded.angles_rad = List::first_of(motion.angles_rad, joints);
         if self.unsettled == 0 {
             decoded.speeds_rad_s = List::first_of(motion.speeds_rad_s, joints);
