@@ -18,6 +18,7 @@ use blindgrasp_shared::device::{Device, Inputs, Outputs};
 use blindgrasp_shared::fault::{Fault, Raised};
 use blindgrasp_shared::identity::{Clock, Identity, Image, ResetCause};
 use blindgrasp_shared::joints::Reading;
+use blindgrasp_shared::link::rate::FASTER_BAUDS;
 use blindgrasp_shared::supervisor::Mode;
 use blindgrasp_shared::telemetry::INTERFACE_VERSION;
 use blindgrasp_shared::telemetry::burst::Burst;
@@ -104,11 +105,11 @@ pub struct SimulatedHand {
 }
 
 impl SimulatedHand {
-    /// A hand that was just switched on, in a scene.
+    /// A hand that was just switched on, in a scene, behind a line of so many baud (0: as fast as one likes).
     ///
     /// # Errors
     /// If no firmware can do what the scene wants, or it can't be simulated.
-    pub fn new(scene: &Scene) -> Result<Self, SimulatedError> {
+    pub fn new(scene: &Scene, baud: u32) -> Result<Self, SimulatedError> {
         let plan = Plan::new(scene)?;
         // Ticks may be late as often as they like: a host is no real-time computer, and what is simulated waits for it.
         let params = plan.with_heartbeat().map_err(PilError::from)?;
@@ -125,9 +126,13 @@ impl SimulatedHand {
             fingertip_count: model.hand.fingertip_count() as u8,
             period_us: model.config.period_us,
         };
-        let identity = Identity { reset: ResetCause::PowerOn, ..Identity::of(image, Clock::External) };
+        let identity =
+            Identity { reset: ResetCause::PowerOn, most_baud: baud, ..Identity::of(image, Clock::External) };
+        // From the fastest on.
+        let slower = FASTER_BAUDS.iter().position(|&faster| baud == 0 || faster <= baud);
+        let faster_bauds = slower.map_or(&[][..], |first| &FASTER_BAUDS[first..]);
         Ok(Self {
-            device: Device::new(params, identity),
+            device: Device::new(params, identity).with_faster_bauds(faster_bauds),
             burst: Box::new(Burst::new()),
             encoders: Encoders::new(scene),
             plant: sim::plant(scene)?,
@@ -240,7 +245,7 @@ mod tests {
     impl Bench {
         fn new(settings: &[&str]) -> Self {
             let settings: Vec<String> = settings.iter().map(|&setting| setting.to_owned()).collect();
-            let hand = SimulatedHand::new(&Scene::load("cube", &settings).unwrap()).unwrap();
+            let hand = SimulatedHand::new(&Scene::load("cube", &settings).unwrap(), 0).unwrap();
             let mut bench = Self { hand, sequence: 0, happened: Vec::new(), counts: Vec::new() };
             bench.ask(Request::Hello { interface_version: INTERFACE_VERSION });
             bench
