@@ -246,12 +246,17 @@ macro_rules! laws {
         #[derive(Clone, Copy, Debug, PartialEq)]
         pub struct Laws<T, const J: usize> {
             config: LawsConfig<T, J>,
+            /// Gains in full, those of laws that are not chosen being zero.
+            gains: PerGain<T>,
             $(#[doc = concat!("The law of ", $words, ".")] pub $law: $law::$Law<T>,)*
         }
 
         impl<T: Real, const J: usize> Laws<T, J> {
             fn prepared<const F: usize>(config: &LawsConfig<T, J>, hand: &Hand<T, J, F>) -> Self {
-                Self { config: *config, $($law: $law::$Law::prepare(hand),)* }
+                let gains = config.gains.zip_with(&PerGain::LAW, |gain, law| {
+                    if config.chosen.has(*law) { *gain } else { T::zero() }
+                });
+                Self { config: *config, gains, $($law: $law::$Law::prepare(hand),)* }
             }
 
             /// Adds the torques of the laws whose gains are not all zero.
@@ -376,10 +381,7 @@ impl<T: Real, const J: usize> Laws<T, J> {
 
     /// Returns the gains in full, those of laws that are not chosen being zero.
     pub fn gains(&self) -> PerGain<T> {
-        let chosen = self.config.chosen;
-        self.config
-            .gains
-            .zip_with(&PerGain::LAW, |gain, law| if chosen.has(*law) { *gain } else { T::zero() })
+        self.gains
     }
 
     /// Returns the whole grip, as configured.
