@@ -149,12 +149,15 @@ impl<'q, P: Port> Link<'q, P> {
             let refusal =
                 || self.refusals.pop_front().map(|(sequence, reason)| refused(sequence, reason).into());
             let next = self.queues.answer().or_else(refusal);
-            let next = next.or_else(|| self.queues.telemetry().map(Answer::from));
-            if let Some(Answer { reply, baud }) = next {
+            // The buffer has room for the longest reply, so this can't fail.
+            let frame = if let Some(Answer { reply, baud }) = next {
                 self.next_baud = baud;
-                // The buffer has room for the longest reply, so this can't fail.
-                self.length = encode(&reply, &mut self.frame).map_or(0, <[u8]>::len);
-                self.sent = 0;
+                Some(encode(&reply, &mut self.frame))
+            } else {
+                self.queues.telemetry().map(|telemetry| telemetry.frame(&mut self.frame))
+            };
+            if let Some(frame) = frame {
+                (self.sent, self.length) = (0, frame.map_or(0, <[u8]>::len));
             }
         }
         if let Some(rest) = self.frame.get(self.sent..self.length) {

@@ -5,10 +5,11 @@
 //! taken.
 
 use crate::model::JOINTS;
+use blindgrasp_shared::bytes::BufferTooSmall;
 use blindgrasp_shared::command::Command;
 use blindgrasp_shared::device::WAITING_MOST;
-use blindgrasp_shared::link::may_take;
 use blindgrasp_shared::link::message::{Form, Packet, Reply, Request};
+use blindgrasp_shared::link::{encode, may_take};
 use blindgrasp_shared::saved::Order;
 use blindgrasp_shared::store::{Store, StoreError};
 use blindgrasp_shared::telemetry::Record;
@@ -44,11 +45,14 @@ pub enum Telemetry {
 }
 
 impl Telemetry {
-    /// As it is sent. Only the link makes it: the digest of an input record takes time that the control task has not.
-    fn reply(self) -> HandReply {
+    /// Writes its frame. Only the link does: the digest of an input record takes time that the control task has not.
+    ///
+    /// # Errors
+    /// The buffer is too small.
+    pub fn frame(self, buffer: &mut [u8]) -> Result<&[u8], BufferTooSmall> {
         match self {
-            Self::Record(record, form) => form.of(&record),
-            Self::Part(part) => Reply::Snapshot(part),
+            Self::Record(mut record, form) => form.frame(&mut record, buffer),
+            Self::Part(part) => encode(&HandReply::Snapshot(part), buffer),
         }
     }
 }
@@ -223,8 +227,8 @@ impl LinkEnd<'_> {
     }
 
     /// The next telemetry to send.
-    pub fn telemetry(&mut self) -> Option<HandReply> {
-        dequeue(&mut self.records).map(Telemetry::reply)
+    pub fn telemetry(&mut self) -> Option<Telemetry> {
+        dequeue(&mut self.records)
     }
 
     /// Whether nothing waits to be sent.
@@ -312,7 +316,7 @@ mod tests {
             assert!(matches!(reply, Some(Reply::Answer { sequence, .. }) if sequence == expected));
         }
         for _ in 0..RECORDS - 1 {
-            assert!(!link.is_empty() && matches!(link.telemetry(), Some(Reply::Input(_))));
+            assert!(!link.is_empty() && matches!(link.telemetry(), Some(Telemetry::Record(..))));
         }
         assert!(link.is_empty());
     }

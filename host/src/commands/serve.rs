@@ -55,7 +55,8 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
     if arguments.baud != 0 && arguments.baud < 9600 {
         bail!("--baud {}: 9600 at least, or 0", arguments.baud);
     }
-    let mut hand = SimulatedHand::new(&scene, arguments.baud).with_context(|| format!("scene {}", scene.name))?;
+    let mut hand =
+        SimulatedHand::new(&scene, arguments.baud).with_context(|| format!("scene {}", scene.name))?;
     if let Some(after_s) = arguments.fail_after {
         hand.fail_after(after_s);
     }

@@ -36,17 +36,30 @@ impl<const J: usize> InputRecord<J> {
         let &Record { sequence, tick, answer, events, reading_failed, counts, .. } = record;
         Self { sequence, tick, answer, events, reading_failed, counts, digest: record.digest() }
     }
+
+    /// Returns the same, and uses the record up.
+    pub(super) fn take(record: &mut Record<J>) -> Self {
+        let sequence = record.sequence;
+        let digest = record.forget_untold();
+        let &mut Record { tick, answer, events, reading_failed, counts, .. } = record;
+        Self { sequence, tick, answer, events, reading_failed, counts, digest }
+    }
 }
 
 impl<const J: usize> Record<J> {
     /// Returns the CRC-32 of the record's bytes (that of the frames), with 0 for all that the tick does not compute:
     /// `sequence`, `cycles`, `dropped` and `decimation`.
     pub fn digest(&self) -> u32 {
+        self.clone().forget_untold()
+    }
+
+    /// Returns the same, and leaves the record as it was digested.
+    fn forget_untold(&mut self) -> u32 {
         const { assert!(Self::MOST_BYTES <= ROOM) };
-        let computed = Self { sequence: 0, cycles: 0, dropped: 0, decimation: 0, ..self.clone() };
+        (self.sequence, self.cycles, self.dropped, self.decimation) = (0, 0, 0, 0);
         // There is room, so this can't fail.
         let mut room = [0; ROOM];
-        postcard::to_slice(&computed, &mut room).map_or(0, |bytes| u32::from_le_bytes(Checksum::of(bytes)))
+        postcard::to_slice(self, &mut room).map_or(0, |bytes| u32::from_le_bytes(Checksum::of(bytes)))
     }
 }
 
@@ -58,7 +71,8 @@ mod tests {
     use super::*;
     use crate::fault::Fault;
     use crate::limit::{Limit, Limiting};
-    use crate::link::message::{Form, Reply};
+    use crate::link::encode;
+    use crate::link::message::{Form, Reply, Signals};
     use crate::supervisor::Mode;
 
     fn record() -> Record<3> {
@@ -92,6 +106,16 @@ mod tests {
         }
         let sent = Record { sequence: 9, cycles: 9, dropped: 9, decimation: 9, ..record() };
         assert_eq!(sent.digest(), whole.digest());
+    }
+
+    #[test]
+    fn a_record_that_is_used_up_gives_the_same_frame() {
+        for form in [Form::Input, Form::Full(Signals::ALL), Form::Full(Signals::COUNTS)] {
+            let record = Record { sequence: 9, cycles: 8, dropped: 7, decimation: 6, ..record() };
+            let (mut buffer, mut other) = ([0; 256], [0; 256]);
+            let expected = encode(&form.of(&record), &mut buffer).unwrap();
+            assert_eq!(form.frame(&mut record.clone(), &mut other).unwrap(), expected, "{form:?}");
+        }
     }
 
     #[test]

@@ -7,7 +7,9 @@
 //!   sequence number.
 //! - Records come by themselves, as `Telemetry` asked for.
 
+use super::encode;
 use super::input::InputRecord;
+use crate::bytes::BufferTooSmall;
 use crate::command::{Command, Refusal};
 use crate::fault::Raised;
 use crate::identity::Identity;
@@ -190,6 +192,24 @@ impl Form {
             Self::Input => Reply::Input(InputRecord::of(record)),
         }
     }
+
+    /// Writes the frame of that reply, and uses the record up: it need not be moved for that.
+    ///
+    /// # Errors
+    /// The buffer is too small; [`most_bytes`](super::most_bytes) of a reply always suffice.
+    pub fn frame<'b, const J: usize>(
+        self,
+        record: &mut Record<J>,
+        buffer: &'b mut [u8],
+    ) -> Result<&'b [u8], BufferTooSmall> {
+        match self {
+            Self::Full(signals) => {
+                record.keep(signals);
+                encode(&(Reply::<J>::RECORD, &*record), buffer)
+            }
+            Self::Input => encode(&(Reply::<J>::INPUT, InputRecord::take(record)), buffer),
+        }
+    }
 }
 
 /// What the device says.
@@ -273,6 +293,10 @@ pub fn not_understood<const J: usize>(bytes: &[u8]) -> Reply<'static, J> {
 }
 
 impl<'a, const J: usize> Reply<'a, J> {
+    /// The number of [`Self::Record`], and that of [`Self::Input`].
+    const RECORD: u8 = 3;
+    const INPUT: u8 = 6;
+
     /// Most bytes of the names in an [`Identity`].
     const NAMES: usize = 160;
 
