@@ -461,6 +461,13 @@ mod tests {
     use std::string::String;
     use std::vec::Vec;
 
+    /// Values for the gains of two laws, and 0 for those of others.
+    fn of_laws(grasp: [f32; 2], integral: f32) -> PerGain<f32> {
+        let mut values = PerGain::all(0.0);
+        (values.grasp, values.integral) = (grasp, [integral]);
+        values
+    }
+
     fn example<const J: usize>() -> Record<J> {
         let mut limiting = [Limiting::NONE; J];
         limiting[1].insert(Limit::Torque);
@@ -476,8 +483,8 @@ mod tests {
             answer: Some(Answer { command: Command::ClearFault, refused: Some(Refusal::FaultPersists) }),
             events: Events::NONE.with(Event::Late, true),
             reading_failed: Some(Raised::at(2, Fault::SampleMissing)),
-            gains: PerGain::of([5.0, 0.005, 0.375]),
-            potentials_j: PerGain::of([0.25, 0.125, 0.75]),
+            gains: of_laws([5.0, 0.005], 0.375),
+            potentials_j: of_laws([0.25, 0.125], 0.75),
             law_signals: PerSignal::all(0.0),
             work_j: -0.5,
             damped_j: 0.03125,

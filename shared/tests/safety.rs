@@ -4,7 +4,6 @@
 mod common;
 
 use blindgrasp_shared::command::{Command, Grasp};
-use blindgrasp_shared::control::PerGain;
 use blindgrasp_shared::device::{Device, Inputs};
 use blindgrasp_shared::event::Event;
 use blindgrasp_shared::fault::{Fault, Raised};
@@ -105,7 +104,8 @@ impl Random {
     fn request(&mut self) -> Request<12> {
         let mut gains =
             || [None, Some(self.below(1000) as f32 * 0.6), Some(f32::NAN)][self.below(3) as usize];
-        let grasp = Grasp { gains: PerGain { grasp: [gains(), gains()], integral: [gains()] } };
+        let mut grasp = Grasp::CONFIGURED;
+        grasp.gains.iter_mut().for_each(|gain| *gain = gains());
         let value = [0.5, 1.0, 20.0, 1e9, f32::NAN][self.below(5) as usize];
         let parameter = Parameter::ALL[self.below(Parameter::COUNT as u32) as usize];
         let index = self.below(13) as u8;

@@ -4,7 +4,6 @@ mod common;
 
 use blindgrasp_shared::bytes::SnapshotError;
 use blindgrasp_shared::command::{Command, Grasp};
-use blindgrasp_shared::control::PerGain;
 use blindgrasp_shared::event::{Event, Events};
 use blindgrasp_shared::fault::{Fault, Raised};
 use blindgrasp_shared::supervisor::Mode;
@@ -63,8 +62,9 @@ fn script(seed: u64, ticks: usize) -> Vec<Step> {
                 _ => {}
             }
             silent = silent.saturating_sub(1);
-            let integral = [Some(0.01 * lcg.below(3) as f32)];
-            let grasp = Grasp { gains: PerGain { grasp: [Some(lcg.below(16) as f32), None], integral } };
+            let mut grasp = Grasp::CONFIGURED;
+            grasp.gains.integral = [Some(0.01 * lcg.below(3) as f32)];
+            grasp.gains.grasp = [Some(lcg.below(16) as f32), None];
             let command = match lcg.below(160) {
                 0..10 => Some(Command::Arm),
                 10..20 => Some(Command::Grasp(Grasp::CONFIGURED)),

@@ -3,7 +3,6 @@
 mod common;
 
 use blindgrasp_shared::command::{Answer, Command, Grasp, Refusal};
-use blindgrasp_shared::control::PerGain;
 use blindgrasp_shared::event::{Event, Events};
 use blindgrasp_shared::fault::{Fault, FaultConfig, Raised};
 use blindgrasp_shared::limit::{Limit, LimitConfig};
@@ -582,7 +581,9 @@ fn a_failed_reading_does_no_work() {
 fn a_grasp_is_as_firm_as_asked_for_within_the_limits() {
     let params: TestParams = params(&config());
     let grasp = |force, stiffness, integral| {
-        Command::Grasp(Grasp { gains: PerGain::of([force, stiffness, integral]) })
+        let mut grasp = Grasp::CONFIGURED;
+        (grasp.gains.grasp, grasp.gains.integral) = ([force, stiffness], [integral]);
+        Command::Grasp(grasp)
     };
     let counts = facing_counts();
     let mut state = in_mode(&params, Mode::Armed);

@@ -104,7 +104,8 @@ fn limiting(values: &[&[Limit]]) -> List<Limiting, J> {
 /// Every request, and some of them more than once.
 fn packets() -> Vec<(&'static str, Packet<J>)> {
     let grasp = Grasp { gains: PerGain { grasp: [Some(3.5), None], ..PerGain::all(None) } };
-    let earlier = Grasp { gains: PerGain { grasp: [None, Some(0.0)], integral: [Some(0.25)] } };
+    let mut earlier = Grasp::CONFIGURED;
+    (earlier.gains.grasp, earlier.gains.integral) = ([None, Some(0.0)], [Some(0.25)]);
     let at_rest: Vec<i32> = (0..JOINTS as i32).map(|k| 300 * k - 1500).collect();
     let command = Request::Command;
     let requests = [
@@ -197,6 +198,13 @@ const IDENTITY: Identity<'static> = Identity {
     restored: Some(Restored { saved: 2, ignored: 1 }),
 };
 
+/// Values for the gains of two laws, and 0 for those of others.
+fn of_laws(grasp: [f32; 2], integral: f32) -> PerGain<f32> {
+    let mut values = PerGain::all(0.0);
+    (values.grasp, values.integral) = (grasp, [integral]);
+    values
+}
+
 /// A hand of three joints in a fault.
 fn faulted() -> AnyRecord {
     Record {
@@ -207,8 +215,8 @@ fn faulted() -> AnyRecord {
         answer: Some(Answer { command: Command::ClearFault, refused: Some(Refusal::FaultPersists) }),
         events: Events::NONE.with(Event::Late, true),
         reading_failed: Some(Raised::of_hand(Fault::SampleMissing)),
-        gains: PerGain::of([5.0, 0.005, 0.375]),
-        potentials_j: PerGain::of([0.25, 0.125, 0.75]),
+        gains: of_laws([5.0, 0.005], 0.375),
+        potentials_j: of_laws([0.25, 0.125], 0.75),
         law_signals: PerSignal::all(0.0),
         work_j: -0.5,
         damped_j: 0.03125,
@@ -238,8 +246,8 @@ fn grasping(k: u32, decimation: u16, step: i32) -> AnyRecord {
         answer: None,
         events: Events::NONE.with(Event::Heartbeat, k % 50 == 3),
         reading_failed: None,
-        gains: PerGain::of([5.0 * share, 0.005, 0.0]),
-        potentials_j: PerGain::of([0.2 - 0.1 * share, 0.001 * share, 0.0]),
+        gains: of_laws([5.0 * share, 0.005], 0.0),
+        potentials_j: of_laws([0.2 - 0.1 * share, 0.001 * share], 0.0),
         law_signals: PerSignal::all(0.0),
         work_j: 0.002 + 0.003 * share,
         damped_j: 0.0005 * share,

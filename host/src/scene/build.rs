@@ -8,7 +8,7 @@ use super::{
     object::object,
     start::start,
 };
-use blindgrasp_shared::control::{GAINS, Ramp};
+use blindgrasp_shared::control::GAINS;
 use nalgebra::Vector3;
 
 /// Longer runs are likely mistakes, s.
@@ -155,8 +155,7 @@ pub(super) fn control(control: &Control) -> Result<()> {
         );
     }
     for (gain, &value) in GAINS.iter().zip(control.gains.iter()) {
-        let least = if gain.ramp == Ramp::Force { 1e-6 } else { 0.0 };
-        within(&format!("control.{}", gain.key), value, least, 1e4)?;
+        within(&format!("control.{}", gain.key), value, gain.least.into(), 1e4)?;
     }
     within("control.damping_scale", control.damping_scale, 0.0, 1e4)?;
     within("control.soft_start_s", control.soft_start_s, 0.0, LONGEST_RUN_S)?;

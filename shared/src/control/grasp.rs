@@ -32,6 +32,7 @@ pub const GAINS: [Gain; 2] = [
         key: "force_n",
         unit: "N",
         words: "Nominal grasping force f_d; that of a fingertip (Eq. 57) grows with the object's size",
+        least: 1e-6,
         ramp: Ramp::Force,
         potential: Signal {
             key: "approach_potential_j",
@@ -43,6 +44,7 @@ pub const GAINS: [Gain; 2] = [
         key: "attitude_stiffness_nm",
         unit: "N m",
         words: "Stiffness K_st of the relative attitudes; zero grasps by normal forces alone",
+        least: 0.0,
         ramp: Ramp::Stiffness,
         potential: Signal {
             key: "attitude_potential_j",

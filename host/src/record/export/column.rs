@@ -235,6 +235,7 @@ fn is_like(pattern: &str, name: &str) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use blindgrasp_shared::control::GAINS;
 
     fn names(patterns: &[&str]) -> Result<Vec<String>, String> {
         let joints = ["thumb-1", "thumb-2", "index-1"].map(str::to_owned);
@@ -259,9 +260,10 @@ mod tests {
         assert_eq!(names(&["index-1"]).unwrap(), names(&["index-1.*"]).unwrap());
         assert_eq!(names(&["index-1"]).unwrap().len(), 1 + of_joint);
         assert_eq!(names(&["*"]).unwrap(), names(&[]).unwrap());
+        let potentials = GAINS.iter().map(|gain| gain.potential.key);
         assert_eq!(
             names(&["*potential*"]).unwrap(),
-            ["time_s", "approach_potential_j", "attitude_potential_j", "integral_potential_j"]
+            ["time_s"].into_iter().chain(potentials).collect::<Vec<_>>()
         );
     }
 
