@@ -80,7 +80,7 @@ fn controller(criterion: &mut Criterion) {
             ..LimitConfig::NONE
         },
         faults: FaultConfig { possible_speed_rad_s: Some([200.0; J]), ..FaultConfig::LEAST },
-        supervisor: SupervisorConfig { soft_start_ms: 0, release_ms: 300, amplifier_start_ms: 0 },
+        supervisor: SupervisorConfig { release_ms: 300, ..SupervisorConfig::LEAST },
     };
     let params = Params::new(hand, &config).expect("parameters");
     let mut state = State::new();

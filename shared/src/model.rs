@@ -163,7 +163,7 @@ fn least<const J: usize>(head: &Head<J>) -> Config<J> {
         },
         limits: LimitConfig::NONE,
         faults: FaultConfig::LEAST,
-        supervisor: SupervisorConfig { soft_start_ms: 0, release_ms: 0, amplifier_start_ms: 0 },
+        supervisor: SupervisorConfig::LEAST,
     }
 }
 

@@ -142,6 +142,9 @@ pub struct SupervisorConfig {
 }
 
 impl SupervisorConfig {
+    /// No time for anything.
+    pub const LEAST: Self = Self { soft_start_ms: 0, release_ms: 0, amplifier_start_ms: 0 };
+
     /// Checks the times and prepares them.
     ///
     /// # Errors
@@ -637,7 +640,7 @@ mod tests {
     #[test]
     fn times_out_of_range_are_named() {
         let period = Period::from_us(1000).unwrap();
-        let good = SupervisorConfig { soft_start_ms: 0, release_ms: 0, amplifier_start_ms: 0 };
+        let good = SupervisorConfig::LEAST;
         let parameter = |config: SupervisorConfig| config.prepare(period).unwrap_err().parameter;
         let config = SupervisorConfig { soft_start_ms: 4_000_000, ..good };
         assert_eq!(parameter(config), "supervisor.soft_start_ms");

@@ -388,7 +388,7 @@ fn parameters_out_of_range_are_named_with_their_joint() {
     assert_eq!(error(|c| c.faults.speed_limit_rad_s = Some(with(1.0, 7, 0.0))), (name.to_owned(), Some(7)));
     assert_eq!(error(|c| c.faults.range_slack_rad = Some(-0.1)), ("faults.range_slack_rad".to_owned(), None));
     assert_eq!(error(|c| c.faults.saturated_ms = Some(u32::MAX)), ("faults.saturated_ms".to_owned(), None));
-    let supervisor = SupervisorConfig { soft_start_ms: 0, release_ms: u32::MAX, amplifier_start_ms: 0 };
+    let supervisor = SupervisorConfig { release_ms: u32::MAX, ..SupervisorConfig::LEAST };
     let mut config = config();
     config.supervisor = supervisor;
     let told = TestParams::new(common::hand(), &config).unwrap_err().to_string();

@@ -106,7 +106,7 @@ pub(crate) fn config<const J: usize>() -> Config<J> {
             late_ticks: Some(3),
             energy_j: Some(1.0),
         },
-        supervisor: SupervisorConfig { soft_start_ms: 100, release_ms: 100, amplifier_start_ms: 0 },
+        supervisor: SupervisorConfig { soft_start_ms: 100, release_ms: 100, ..SupervisorConfig::LEAST },
     }
 }
 
