@@ -456,6 +456,7 @@ mod tests {
     use crate::event::Event;
     use crate::fault::Fault;
     use crate::limit::Limit;
+    use crate::parameters::Parameter;
     use proptest::prelude::*;
     use std::format;
     use std::string::String;
@@ -563,6 +564,11 @@ mod tests {
             faults.push(postcard::to_slice(fault, &mut buffer).unwrap().to_vec());
         }
         assert_eq!(bytes(faults), "0102030405060708090a0b0c0d");
+        // Their numbers are bytes on the wire: a row that is added moves those behind it.
+        let names = Parameter::ALL
+            .iter()
+            .fold(0_u32, |digest, parameter| digest.rotate_left(5) ^ parameter.key().hash());
+        assert_eq!(names, 3707318196, "the numbers of parameters: another interface version");
     }
 
     #[test]

@@ -1,6 +1,7 @@
 //! Samples as comma-separated values: one row a control tick.
 
 use super::sample::{ContactSample, Sample};
+use blindgrasp_shared::control::GAINS;
 use std::io::Write;
 
 /// Writes samples with a header. Numbers are in the shortest form that reads back as the same bits.
@@ -38,9 +39,10 @@ fn header(joints: usize, fingers: usize) -> Vec<String> {
         let contact = ["f_N", "lambda_x", "lambda_z", "dr", "foot_x", "foot_z"];
         names.extend(contact.map(|quantity| format!("{quantity}_{finger}")));
     }
-    let energies = ["energy", "kinetic", "elastic", "weight", "approach", "attitude", "integral"];
+    let energies = ["energy", "kinetic", "elastic", "weight"];
+    let potentials = GAINS.map(|gain| gain.potential.key.trim_end_matches("_potential_j"));
     let flows = ["motors", "damping", "indentation", "torsion", "friction", "pushes"];
-    names.extend(energies.iter().chain(&flows).map(|name| format!("{name}_j")));
+    names.extend(energies.iter().chain(&potentials).chain(&flows).map(|name| format!("{name}_j")));
     names.push("mode".to_owned());
     names
 }
@@ -61,6 +63,6 @@ fn fill(row: &mut Vec<f64>, sample: &Sample) {
     }
     let of = &sample.energies;
     row.extend([sample.energy_j, of.kinetic_j, of.elastic_j, of.weight_j]);
-    row.extend([of.approach_j, of.attitude_j, of.integral_j]);
+    row.extend(of.potentials_j.iter());
     row.extend([of.motors_j, of.damping_j, of.indentation_j, of.torsion_j, of.friction_j, of.pushes_j]);
 }

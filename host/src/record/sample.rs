@@ -1,6 +1,7 @@
 //! One sample a control tick: the state of everything.
 
 use crate::{Hand, MAX_JOINTS, Posture};
+use blindgrasp_shared::control::PerGain;
 use nalgebra::{UnitQuaternion, Vector3};
 
 /// The state of everything at one control tick. Vectors are in the base frame of the hand.
@@ -63,12 +64,9 @@ pub struct EnergySample {
     pub elastic_j: f64,
     /// Potential energy of the weight of hand and object, J, above some level.
     pub weight_j: f64,
-    /// Potential `V_s` of the law at full force (Eq. 43), J.
-    pub approach_j: f64,
-    /// Potential `V_st` of the law (Eq. 44) above its least value, J.
-    pub attitude_j: f64,
-    /// Potential of the earlier law's `u_I`, J.
-    pub integral_j: f64,
+    /// Potential of each gain of the laws, at its full force, J: `V_s` (Eq. 43), `V_st` (Eq. 44) above its least value, and what
+    /// other laws have.
+    pub potentials_j: PerGain<f64>,
     /// Work of the motors, J.
     pub motors_j: f64,
     /// Work of what pushes the object from outside, J.
@@ -92,7 +90,7 @@ pub struct EnergySample {
 impl EnergySample {
     /// Energy of Eq. 40 with its constants added, J.
     pub fn of_equation_40_j(&self) -> f64 {
-        self.kinetic_j + self.elastic_j + self.approach_j + self.attitude_j + self.integral_j
+        self.potentials_j.iter().fold(self.kinetic_j + self.elastic_j, |sum, potential_j| sum + potential_j)
     }
 
     /// What the plant stores, J: without the law's potentials, which are the motors' to give.

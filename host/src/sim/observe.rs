@@ -47,17 +47,13 @@ impl Observer {
         let Motion { angles_rad, speeds_rad_s, .. } = plant.motion();
         let stance = Stance { hand: &plant.model().hand, posture: plant.posture(), angles_rad };
         let (_, account) = self.laws.torques(&stance, speeds_rad_s, Some(&grip));
-        let [approach_j, attitude_j] = account.potentials_j.grasp;
-        let [integral_j] = account.potentials_j.integral;
         let flows = plant.flows();
         let gains = self.laws.config().hold.damping_nm_s.iter();
         EnergySample {
             kinetic_j: plant.kinetic_energy_j(),
             elastic_j: plant.elastic_energy_j(),
             weight_j: plant.weight_energy_j(),
-            approach_j,
-            attitude_j,
-            integral_j,
+            potentials_j: account.potentials_j,
             motors_j: flows.motors,
             pushes_j: flows.pushes,
             damping_j: gains.zip(&flows.joint_speeds_squared).map(|(gain, squares)| gain * squares).sum(),

@@ -290,7 +290,10 @@ pub struct Chosen(u8);
 
 impl Chosen {
     /// Every law.
-    pub const ALL: Self = Self(((1_u16 << LAWS.len()) - 1) as u8);
+    pub const ALL: Self = {
+        assert!(LAWS.len() <= 8, "there is a bit for each");
+        Self(((1_u16 << LAWS.len()) - 1) as u8)
+    };
     /// None of them.
     pub const NONE: Self = Self(0);
 

@@ -26,8 +26,8 @@ fn evaluated(done: &Done, sample: &Sample) -> (f64, f64) {
     let stiffness_nm = done.scene.control.attitude_stiffness_nm();
     let most = 3.0 * done.scene.hand.fingertip_count() as f64;
     // Eq. 44 with its constant is K_st (3 N - sum of the traces). Where the traces sum to nothing or less, any K_st will do.
-    let traces = most - sample.energies.attitude_j / stiffness_nm;
-    let bound_nm = if traces > 0.0 { sample.energies.approach_j / traces } else { f64::INFINITY };
+    let traces = most - sample.energies.potentials_j.grasp[1] / stiffness_nm;
+    let bound_nm = if traces > 0.0 { sample.energies.potentials_j.grasp[0] / traces } else { f64::INFINITY };
     (bound_nm, sample.energies.of_equation_40_j() - most * stiffness_nm)
 }
 

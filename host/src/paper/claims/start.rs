@@ -58,7 +58,7 @@ pub(super) fn latch(evidence: &Evidence) -> Result<Claim, EvidenceError> {
 }
 
 pub(super) fn latch_row(done: &Done) -> Row {
-    let potential = done.run.samples.first().map_or(f64::NAN, |sample| sample.energies.attitude_j);
+    let potential = done.run.samples.first().map_or(f64::NAN, |sample| sample.energies.potentials_j.grasp[1]);
     let most = 3.0 * done.scene.hand.fingertip_count() as f64 * done.scene.control.attitude_stiffness_nm();
     let mut row = row(
         done,

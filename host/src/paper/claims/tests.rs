@@ -231,7 +231,7 @@ fn wrenches_and_starts() {
     assert_eq!(start::latch_row(&arm).verdict, Reproduced);
     arm.scene.start.indentations_m[2] += 1e-3;
     assert_eq!(start::table_iii_row(&arm).verdict, NotReproduced);
-    arm.run.samples[0].energies.attitude_j = 1e-6;
+    arm.run.samples[0].energies.potentials_j.grasp[1] = 1e-6;
     assert_eq!(start::latch_row(&arm).verdict, NotReproduced);
 
     let mut with = done("cube-weight", "cube", &[]);
