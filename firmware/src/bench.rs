@@ -17,7 +17,6 @@ use blindgrasp_shared::device::Inputs;
 use blindgrasp_shared::fault::Raised;
 use blindgrasp_shared::hand::Posture;
 use blindgrasp_shared::joints::{Joints, Reading};
-use blindgrasp_shared::link::encode;
 use blindgrasp_shared::link::message::{Form, Packet, Reply, Request, Signals};
 use blindgrasp_shared::supervisor::Mode;
 use blindgrasp_shared::telemetry::INTERFACE_VERSION;

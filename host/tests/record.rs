@@ -4,6 +4,8 @@
 #![cfg(unix)]
 
 use blindgrasp::record::mcap::{Decoded, Decoder, Recording, Stamp, What};
+use blindgrasp::wire::Record;
+use blindgrasp_shared::event::Event;
 use blindgrasp_shared::fault::Fault;
 use blindgrasp_shared::link::message::Reply;
 use blindgrasp_shared::parameters::Parameter;
@@ -376,6 +378,46 @@ fn a_script_is_recorded_with_its_grasp_a_fault_and_what_was_caught_around_it() {
     let angles = content.records.iter().filter(|decoded| !decoded.angles_rad.as_slice().is_empty()).count();
     assert!(angles + 200 > content.records.len(), "{angles} records with angles");
     assert_replayed_and_exported(&out, &content.records);
+}
+
+/// A sign and a zero that are set while it is recorded: what was computed with them is replayed to the bit.
+#[test]
+fn signs_and_zeros_that_are_set_are_replayed() {
+    let folder = TempDir::new().expect("a folder");
+    let (link, out) = (folder.path().join("hand"), folder.path().join("zero.mcap"));
+    let _hand = serve(&link, &[]);
+    let (port, path) = (link.to_str().expect("UTF-8"), out.to_str().expect("UTF-8"));
+    let mut command = blindgrasp(&["console", "--port", port, "--out", path]);
+    command.stdin(Stdio::piped());
+    let mut console = Process::start(command);
+    let mut stdin = console.0.stdin.take().expect("stdin");
+    for (line, milliseconds) in [
+        ("status", 1000),
+        ("zero 4", 1500),
+        ("set encoder_reversed 5 1", 1500),
+        ("confirm", 500),
+        ("arm", 1500),
+    ] {
+        writeln!(stdin, "{line}").expect("the line is taken");
+        thread::sleep(Duration::from_millis(milliseconds));
+    }
+    drop(stdin);
+    let (code, said, errors) = console.end(PATIENCE);
+    assert_eq!(code, Some(0), "{said}\n{errors}");
+    let [content] = &read(&out)[..] else { panic!("one device") };
+    let of = |wanted: &dyn Fn(&Record) -> bool| {
+        content.records.iter().filter(|decoded| wanted(&decoded.record)).count()
+    };
+    let unconfirmed = of(&|record| record.events.contains(Event::Unconfirmed));
+    assert!(unconfirmed > 2000, "{unconfirmed} ticks");
+    assert!(of(&|record| record.mode == Mode::Armed) > 1000);
+    let (code, said, errors) = Process::start(blindgrasp(&["replay", "--json", path])).end(PATIENCE);
+    assert_eq!(code, Some(0), "{said}\n{errors}");
+    let replay: Value = serde_json::from_str(&said).expect("JSON");
+    let number = |value: &Value| value.as_u64().expect("a number");
+    assert_eq!(number(&replay["bits_differ"]), 0);
+    // While parameters are read anew, the state is not known.
+    assert!(number(&replay["ticks"]) > 3 * number(&replay["not_replayed"]), "{replay}");
 }
 
 #[test]

@@ -96,7 +96,7 @@ mod tests {
             Record { mode: Mode::Armed, ..record() },
             Record { fault: Some(Raised::of_hand(Fault::LinkLost)), ..record() },
             Record { work_j: f32::from_bits(1), ..record() },
-            Record { excess_j: -0.0, ..record() },
+            Record { damped_j: -0.0, ..record() },
             Record { late_ticks: 1, ..record() },
             Record { counts: List::first_of([0, -1, 21_601], 3), ..record() },
             Record { torques_nm: List::first_of([0.5, -1.25, -0.0], 3), ..record() },
