@@ -155,7 +155,8 @@ pub(super) fn control(control: &Control) -> Result<()> {
         );
     }
     for (gain, &value) in GAINS.iter().zip(control.gains.iter()) {
-        within(&format!("control.{}", gain.key), value, gain.least.into(), 1e4)?;
+        let least = if gain.may_be_zero { 0.0 } else { 1e-6 };
+        within(&format!("control.{}", gain.key), value, least, 1e4)?;
     }
     within("control.damping_scale", control.damping_scale, 0.0, 1e4)?;
     within("control.soft_start_s", control.soft_start_s, 0.0, LONGEST_RUN_S)?;

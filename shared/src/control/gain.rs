@@ -1,7 +1,7 @@
 //! Gains, as tables and files know them.
 
 /// A gain of a law, and the potential that is proportional to it.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Gain {
     /// Its name in files, on the line and in tables, with its unit.
     pub key: &'static str,
@@ -9,8 +9,8 @@ pub struct Gain {
     pub unit: &'static str,
     /// Its meaning.
     pub words: &'static str,
-    /// The least that a file may say; what is not needed may be left out by 0.
-    pub least: f32,
+    /// A file may leave it out by 0.
+    pub may_be_zero: bool,
     /// The ramp that it follows when a grasp begins and ends.
     pub ramp: Ramp,
     /// The potential of what it is the gain of, J.

@@ -32,7 +32,7 @@ pub const GAINS: [Gain; 2] = [
         key: "force_n",
         unit: "N",
         words: "Nominal grasping force f_d; that of a fingertip (Eq. 57) grows with the object's size",
-        least: 1e-6,
+        may_be_zero: false,
         ramp: Ramp::Force,
         potential: Signal {
             key: "approach_potential_j",
@@ -44,7 +44,7 @@ pub const GAINS: [Gain; 2] = [
         key: "attitude_stiffness_nm",
         unit: "N m",
         words: "Stiffness K_st of the relative attitudes; zero grasps by normal forces alone",
-        least: 0.0,
+        may_be_zero: true,
         ramp: Ramp::Stiffness,
         potential: Signal {
             key: "attitude_potential_j",

@@ -28,7 +28,7 @@ pub const GAINS: [Gain; 1] = [Gain {
     key: "integral_gain_nm_rad",
     unit: "N m/rad",
     words: "Gain K_I of the earlier law's integral of each joint's velocity; zero leaves it out",
-    least: 0.0,
+    may_be_zero: true,
     ramp: Ramp::Stiffness,
     potential: Signal {
         key: "integral_potential_j",
