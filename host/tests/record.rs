@@ -292,7 +292,8 @@ fn idle_hand(seconds: u32) -> [f64; 2] {
     assert_eq!((code, &report["whole"]), (Some(0), &Value::Bool(true)), "{said}\n{errors}");
     let [content] = &read(&out)[..] else { panic!("one device") };
     assert!(!content.damaged && content.gaps.is_empty());
-    assert_eq!((content.sessions, content.settings), (1, Parameter::ALL.len() + 2 + 11 * 9));
+    let settings: usize = Parameter::ALL.iter().map(|parameter| usize::from(parameter.count(12))).sum();
+    assert_eq!((content.sessions, content.settings), (1, settings));
     assert_whole(&content.records);
     assert_eq!(report["records"].as_u64(), Some(content.records.len() as u64));
     // Everything but the first moments, in which parameters are read.
