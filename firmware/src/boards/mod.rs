@@ -1,7 +1,7 @@
 //! The boards: a folder each, with all that is true of that board alone, behind one trait. One line of the library's root
 //! chooses.
 //!
-//! How to write one, `docs/new-board.md` says, step by step.
+//! `docs/new-board.md` says how to write one, step by step.
 
 use crate::link::Port;
 use crate::model::JOINTS;
@@ -17,13 +17,13 @@ pub trait Board: Sized {
     type Joints: Joints<JOINTS>;
     /// The line to the host.
     type Line: Port;
-    /// What serves the line's interrupts; which ones they are, the images say.
+    /// Handlers of the line's interrupts; the images say which ones they are.
     type Interrupts;
     /// Flash for saved parameters.
     type Flash: NorFlash;
     /// The watchdog.
     type Watchdog;
-    /// What its parts need for as long as the program runs.
+    /// Memory that its parts need for as long as the program runs.
     type Memory: 'static;
 
     /// Frequency of the processor and its timer, Hz.
@@ -31,7 +31,7 @@ pub trait Board: Sized {
     /// That of the timer in the emulator, Hz.
     const EMULATED_HZ: u32;
 
-    /// What the start found.
+    /// Returns the findings of the start.
     fn found(&self) -> &Found;
     /// Flash for saved parameters, once; nothing where it can't be written.
     fn take_flash(&mut self) -> Option<Self::Flash>;
@@ -44,7 +44,7 @@ pub trait Board: Sized {
     fn feed(watchdog: &mut Self::Watchdog);
     /// Takes the amplifiers' power away, whoever has the pin.
     fn amplifiers_off();
-    /// Whether the supply is too low, or was since [`Self::take_supply_low`].
+    /// Returns true while the supply is too low, or if it was since [`Self::take_supply_low`].
     fn supply_is_low() -> bool;
     /// [`Self::supply_is_low`], once.
     fn take_supply_low() -> bool;
@@ -52,7 +52,7 @@ pub trait Board: Sized {
     fn line_errors() -> (u32, u32);
     /// Processor cycles since the start, modulo 2^32; zero where they can't be counted.
     fn cycle_count() -> u32;
-    /// Whether the timer has called for the next turn of the control task already.
+    /// Returns true if the timer has called for the next turn of the control task already.
     fn is_late() -> bool;
 }
 
@@ -68,21 +68,21 @@ pub struct Parts<B: Board> {
     pub watchdog: Option<B::Watchdog>,
 }
 
-/// What the start of a board found.
+/// Findings of the start of a board.
 #[derive(Clone, Copy, Debug)]
 pub struct Found {
-    /// What drives the clock.
+    /// Source of the clock.
     pub clock: Clock,
     /// Why there was a reset.
     pub reset: ResetCause,
-    /// What ended the run before it.
+    /// Crash that ended the run before it.
     pub crash: Option<Crash>,
     /// Level of the brown-out reset.
     pub brown_out: BrownOut,
 }
 
 impl Found {
-    /// Whether this is the emulator.
+    /// Returns true in the emulator.
     pub fn is_emulated(&self) -> bool {
         self.clock == Clock::Emulated
     }
