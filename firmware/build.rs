@@ -10,7 +10,7 @@
 //!
 //! The same sources and the same hand give the same bytes wherever the repository lies.
 
-use blindgrasp::scene::HandModel;
+use blindgrasp_model::HandModel;
 use blindgrasp_shared::identity::Image;
 use blindgrasp_shared::telemetry::INTERFACE_VERSION;
 use crc::{CRC_32_ISO_HDLC, Crc};

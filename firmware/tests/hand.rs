@@ -1,9 +1,9 @@
 //! What this firmware was built with, against the hand's file (`HAND`, as for the build).
 
-use blindgrasp::scene::HandModel;
 use blindgrasp_firmware::model::{
     FINGERS, IMAGE_HAND, IMAGE_PIL, JOINTS, MODEL, params, torques_per_volt_nm_v,
 };
+use blindgrasp_model::HandModel;
 use blindgrasp_shared::hand::Hand;
 use blindgrasp_shared::identity::Image;
 use blindgrasp_shared::model::encode;

@@ -1,9 +1,9 @@
 //! `cargo bench`: the tick and the law on the host, one step of the plant, and a whole run.
 
+use blindgrasp::body::{MAX_JOINTS, Posture};
+use blindgrasp::model::Scene;
 use blindgrasp::plant::{Motion, Plant};
-use blindgrasp::scene::Scene;
 use blindgrasp::sim::{self, Simulation};
-use blindgrasp::{MAX_JOINTS, Posture};
 use blindgrasp_shared::command::{Command, Grasp};
 use blindgrasp_shared::control::{Chosen, Hold, Latch, LawsConfig, Stance};
 use blindgrasp_shared::estimate::{Encoder, EstimatorConfig};

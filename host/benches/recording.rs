@@ -2,9 +2,9 @@
 
 #![allow(clippy::unwrap_used)]
 
-use blindgrasp::MAX_JOINTS;
+use blindgrasp::body::MAX_JOINTS;
+use blindgrasp::model::Scene;
 use blindgrasp::record::mcap::{Decoder, Entry, Recording, What, Writer};
-use blindgrasp::scene::Scene;
 use blindgrasp::sim::Simulation;
 use blindgrasp::sim::recorder::Recorder;
 use blindgrasp_shared::link::message::{Form, Reply};

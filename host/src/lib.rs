@@ -1,32 +1,16 @@
-//! The host side of blindgrasp: the simulated plant, the closed loop around the same tick that the microcontroller
-//! runs, scenes, and reports.
+//! The rooms of the host side under one roof: the simulated world, the closed loop around the same tick that the
+//! microcontroller runs, and what the command `blindgrasp` is made of.
 
-/// The largest hand that the host loads: joints.
-pub const MAX_JOINTS: usize = 24;
-/// The largest hand that the host loads: fingertips.
-pub const MAX_FINGERS: usize = 5;
-
-/// A hand of any size, in the precision of the plant.
-pub type Hand = blindgrasp_shared::hand::Hand<f64, MAX_JOINTS, MAX_FINGERS>;
-/// A posture of a [`Hand`].
-pub type Posture = blindgrasp_shared::hand::Posture<f64, MAX_JOINTS, MAX_FINGERS>;
-
-#[cfg(feature = "command")]
-pub mod device;
-pub mod inspect;
-#[cfg(feature = "command")]
-pub mod monitor;
-#[cfg(feature = "command")]
-pub mod paper;
-pub mod placement;
-pub mod plant;
-pub mod population;
-pub mod record;
-#[cfg(feature = "command")]
-pub mod report;
-pub mod scene;
-pub mod sim;
-#[cfg(feature = "command")]
-pub mod sweep;
-#[cfg(feature = "command")]
-pub mod wire;
+pub use blindgrasp_body as body;
+pub use blindgrasp_device as device;
+pub use blindgrasp_model as model;
+pub use blindgrasp_monitor as monitor;
+pub use blindgrasp_paper as paper;
+pub use blindgrasp_place as place;
+pub use blindgrasp_plant as plant;
+pub use blindgrasp_record as record;
+pub use blindgrasp_rig as rig;
+pub use blindgrasp_sim as sim;
+pub use blindgrasp_sweep as sweep;
+pub use blindgrasp_view as view;
+pub use blindgrasp_wire as wire;

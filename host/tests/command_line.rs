@@ -100,7 +100,7 @@ fn the_help_names_every_built_in_scene() {
     let output = blindgrasp(&["sim", "--help"]);
     assert_eq!(output.status.code(), Some(0));
     let help = text(&output.stdout);
-    for name in blindgrasp::scene::Scene::built_in() {
+    for name in blindgrasp::model::Scene::built_in() {
         assert!(help.contains(name), "no `{name}` in: {help}");
     }
 }

@@ -4,10 +4,10 @@
 #[path = "../../shared/tests/flash/mod.rs"]
 mod flash;
 
+use blindgrasp::body::{MAX_FINGERS, MAX_JOINTS};
 use blindgrasp::device::talk::{Event, PATIENCE, Talk, TalkError};
-use blindgrasp::scene::HandModel;
+use blindgrasp::model::HandModel;
 use blindgrasp::wire::{Answer, Packet, Request};
-use blindgrasp::{MAX_FINGERS, MAX_JOINTS};
 use blindgrasp_shared::command::{Command, Refusal};
 use blindgrasp_shared::device::{Device, Inputs};
 use blindgrasp_shared::fault::{Fault, Raised};

@@ -217,7 +217,7 @@ fn read(path: &Path) -> Vec<Content> {
             What::Gap { .. } => content.gaps.push(content.records.len()),
             What::Received(payload) => {
                 content.last_received = content.last_received.max(Some(entry.at));
-                match Reply::<{ blindgrasp::MAX_JOINTS }>::decode(payload) {
+                match Reply::<{ blindgrasp::body::MAX_JOINTS }>::decode(payload) {
                     Ok(Reply::Snapshot(part)) => {
                         let whole = collectors[entry.device].add(&part).map(|(tick, _)| tick);
                         content.snapshots.extend(whole);

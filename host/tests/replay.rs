@@ -4,7 +4,7 @@
 
 mod recorded;
 
-use blindgrasp::MAX_JOINTS;
+use blindgrasp::body::MAX_JOINTS;
 use blindgrasp::record::mcap::{Decoder, Recording};
 use blindgrasp::record::replay::{Reason, ReplayError, Report, Wanted, replay};
 use blindgrasp_shared::command::{Command, Grasp};
@@ -270,7 +270,8 @@ fn damping_makes_the_difference_that_the_law_says() {
     // In Eq. 30, damping is a torque -C dq by itself: of another C, nothing differs but that.
     let change_nm_s = 0.02 - f64::from(config.laws.hold.damping_nm_s[4]);
     let estimator =
-        Params::<MAX_JOINTS, { blindgrasp::MAX_FINGERS }>::new(hand.model.hand.cast(), &config).unwrap();
+        Params::<MAX_JOINTS, { blindgrasp::body::MAX_FINGERS }>::new(hand.model.hand.cast(), &config)
+            .unwrap();
     let (mut tracks, mut motion) = (Tracks::new(), Motion::still());
     let (mut squares, mut largest, mut powered) = (0.0, 0.0_f64, 0_u32);
     for (k, record) in records.iter().enumerate() {
@@ -393,9 +394,9 @@ fn recorded_folder(what: impl FnOnce(&mut Session)) -> (TempDir, PathBuf) {
 fn angles_of_a_recording_are_those_of_the_controller() {
     let (_folder, path) = folder();
     let (hand, config, _) = unlimited(&path, 500);
-    let params: Params<MAX_JOINTS, { blindgrasp::MAX_FINGERS }> =
+    let params: Params<MAX_JOINTS, { blindgrasp::body::MAX_FINGERS }> =
         Params::new(hand.model.hand.cast(), &config).unwrap();
-    let mut state: State<MAX_JOINTS, { blindgrasp::MAX_FINGERS }> = State::new();
+    let mut state: State<MAX_JOINTS, { blindgrasp::body::MAX_FINGERS }> = State::new();
     let mut decoder = Decoder::new();
     let recording = Recording::open(&path).unwrap();
     let mut compared = 0;

@@ -2,12 +2,14 @@
 //! what is taken by contacts and joints.
 
 use crate::supervised::{Outcome, Turned};
+use blindgrasp::body::dynamics::JointVector;
+use blindgrasp::body::{MAX_FINGERS, MAX_JOINTS, Posture};
+use blindgrasp::model::Scene;
 use blindgrasp::plant::Plant;
 use blindgrasp::plant::contact::Rows;
-use blindgrasp::plant::dynamics::JointVector;
-use blindgrasp::record::sample::Sample;
-use blindgrasp::scene::Scene;
-use blindgrasp::{MAX_FINGERS, MAX_JOINTS, Posture, sim};
+use blindgrasp::plant::friction::{stretch, torque};
+use blindgrasp::sim;
+use blindgrasp::sim::sample::Sample;
 use blindgrasp_shared::command::{Command, Grasp};
 use blindgrasp_shared::control::{Grip, Latch, Stance};
 use blindgrasp_shared::telemetry::Record;
@@ -112,7 +114,7 @@ pub fn keep(scene: &Scene) -> Vec<Page> {
             let speeds = plant.motion().speeds_rad_s;
             let rubbing: JointVector = std::array::from_fn(|k| {
                 friction.get(k).map_or(0.0, |friction| {
-                    let friction = friction.torque(stretch_rad[k], ahead[k]);
+                    let friction = torque(friction, stretch_rad[k], ahead[k]);
                     (friction.torque_nm + friction.damping_nm_s * speeds[k]) * speeds[k]
                 })
             });
@@ -132,7 +134,7 @@ pub fn keep(scene: &Scene) -> Vec<Page> {
             for k in 0..joints {
                 let turned_rad = plant.motion().angles_rad[k] - angles[k];
                 books.work_j += now_nm[k] * turned_rad;
-                stretch_rad[k] = friction[k].stretch(stretch_rad[k], turned_rad);
+                stretch_rad[k] = stretch(&friction[k], stretch_rad[k], turned_rad);
             }
         }
     }

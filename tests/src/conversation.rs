@@ -1,7 +1,7 @@
 //! The host's end of a link to a firmware, frame by frame: requests go out when they like, answers and records come in
 //! when they like.
 
-use blindgrasp::MAX_JOINTS;
+use blindgrasp::body::MAX_JOINTS;
 use blindgrasp::device::transport::{Transport, TransportError};
 use blindgrasp::wire::{Packet, Record, Request};
 use blindgrasp_shared::command::Refusal;

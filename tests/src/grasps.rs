@@ -5,12 +5,12 @@
 
 use crate::description::Description;
 use crate::hands::{FINGER_JOINTS, NEAR_GRASP_RAD};
-use blindgrasp::plant::contact::{FaceContact, FingertipModel};
-use blindgrasp::plant::dynamics::JointVector;
-use blindgrasp::plant::friction::JointFriction;
-use blindgrasp::plant::polyhedron::Polyhedron;
+use blindgrasp::body::JointFriction;
+use blindgrasp::body::dynamics::JointVector;
+use blindgrasp::body::polyhedron::Polyhedron;
+use blindgrasp::body::{FaceContact, FingertipModel};
+use blindgrasp::body::{Hand, MAX_FINGERS, MAX_JOINTS, Posture};
 use blindgrasp::plant::{Motion, ObjectModel, Plant, PlantModel};
-use blindgrasp::{Hand, MAX_FINGERS, MAX_JOINTS, Posture};
 use blindgrasp_shared::control::{Account, Chosen, Hold, Latch, Laws, LawsConfig, PerGain, Stance};
 use blindgrasp_shared::math::Real;
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};

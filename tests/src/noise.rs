@@ -1,7 +1,7 @@
 //! Meshes with noise on their vertices: polyhedra as a scanner or a printer gives them.
 
-use blindgrasp::plant::polyhedron::Polyhedron;
-use blindgrasp::population::{Draw, RandomPolyhedron};
+use blindgrasp::body::polyhedron::Polyhedron;
+use blindgrasp::place::population::{Draw, RandomPolyhedron};
 use nalgebra::Vector3;
 use std::collections::BTreeMap;
 

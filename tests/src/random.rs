@@ -1,7 +1,7 @@
 //! Seeded random inertias and hands, besides what the library draws. The same seed gives the same hand on every machine.
 
 use crate::description::Description;
-use blindgrasp::population;
+use blindgrasp::place::population;
 use blindgrasp_shared::hand::{Fingertip, Joint, Link};
 use nalgebra::{Matrix3, Vector3};
 use std::f64::consts::PI;

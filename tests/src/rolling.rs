@@ -8,11 +8,12 @@
 
 use crate::numeric::Taylor;
 use crate::random::Draw;
-use blindgrasp::plant::contact::FaceContact;
-use blindgrasp::plant::dynamics::JointVector;
+use blindgrasp::body::FaceContact;
+use blindgrasp::body::dynamics::JointVector;
+use blindgrasp::body::{MAX_JOINTS, Posture};
+use blindgrasp::model::Scene;
 use blindgrasp::plant::{Motion, Plant, PlantModel};
-use blindgrasp::scene::Scene;
-use blindgrasp::{MAX_JOINTS, Posture, sim};
+use blindgrasp::sim;
 use blindgrasp_shared::math::norm;
 use nalgebra::{Rotation3, UnitQuaternion, Vector3};
 
@@ -66,7 +67,7 @@ impl State {
     pub fn random(scene: &Scene, gravity_m_s2: &Vector3<f64>, draw: &mut Draw) -> Option<Self> {
         let mut model = sim::model(scene);
         (model.hand_gravity_m_s2, model.object_gravity_m_s2) = (*gravity_m_s2, *gravity_m_s2);
-        model.friction.fill(blindgrasp::plant::friction::JointFriction::default());
+        model.friction.fill(blindgrasp::body::JointFriction::default());
         if draw.chance(0.5) {
             for fingertip in &mut model.fingertips {
                 fingertip.torsion_n_s_m *= 10_f64.powf(draw.within(-6.0, 0.0));

@@ -1,10 +1,10 @@
 //! Many objects, placed in the paper's hand and grasped in the paper's own model, with `u_st` and without, and once more with
 //! the encoders, the delay, the limits and the friction of the hand.
 
-use blindgrasp::placement::Placement;
-use blindgrasp::population::PlacingHand;
-use blindgrasp::scene::Scene;
-use blindgrasp::scene::file::{ObjectFile, SceneFile};
+use blindgrasp::model::Scene;
+use blindgrasp::model::file::{ObjectFile, SceneFile};
+use blindgrasp::place::Placement;
+use blindgrasp::place::population::PlacingHand;
 use blindgrasp::sim::Simulation;
 use blindgrasp::sim::summary::Summary;
 use std::sync::Mutex;

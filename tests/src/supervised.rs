@@ -2,12 +2,12 @@
 //! commands it and gives signs of life, wrong wiring, and people who push.
 
 use crate::books::stored_j;
+use blindgrasp::body::{MAX_FINGERS, MAX_JOINTS, Posture};
+use blindgrasp::model::{HandModel, Scene};
 use blindgrasp::plant::{Motion, Plant};
-use blindgrasp::scene::{HandModel, Scene};
 use blindgrasp::sim::controller::{Controller, Reach, Stepped, Turn};
 use blindgrasp::sim::injection::{Injection, Kind};
 use blindgrasp::sim::{Run, Simulation, model};
-use blindgrasp::{MAX_FINGERS, MAX_JOINTS, Posture};
 use blindgrasp_shared::command::Command;
 use blindgrasp_shared::control::PerGain;
 use blindgrasp_shared::event::{Event, Events};
@@ -212,7 +212,7 @@ pub fn push_nm(scene: &Scene, fingertip: usize, force_n: Vector3<f64>) -> [f32; 
 /// # Panics
 /// If the scene has no equations of motion.
 pub fn mechanical_energy_j(scene: &Scene, outcome: &Outcome, from: usize) -> Vec<f64> {
-    let energy = |sample: &blindgrasp::record::sample::Sample| {
+    let energy = |sample: &blindgrasp::sim::sample::Sample| {
         let padded = |values: &[f64]| std::array::from_fn(|k| values.get(k).copied().unwrap_or(0.0));
         let motion = Motion {
             angles_rad: padded(&sample.angles_rad),

@@ -129,7 +129,7 @@ fn signals_and_parameters_are_listed_once() {
         // Written by a test.
         "examples/python/blindgrasp_tables.py",
     ];
-    let folders = ["shared/src", "firmware/src", "host/src", "examples"];
+    let folders = ["shared/src", "firmware/src", "host", "examples"];
     let sources = folders.iter().flat_map(|folder| {
         let folder = root().join(folder);
         [files(&folder, ".rs"), files(&folder, ".py")].concat()

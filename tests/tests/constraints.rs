@@ -1,11 +1,11 @@
 //! Rolling constraints and contact forces: against material points followed from scratch, against the equations of
 //! motion (Eqs. 19-21), against a dense system of them; and a held object that stays where it is.
 
+use blindgrasp::body::JointFriction;
+use blindgrasp::body::dynamics::{Body, JointVector, bias_torques, mass_matrix, place_bodies};
+use blindgrasp::body::{MAX_JOINTS, Posture};
 use blindgrasp::plant::contact::Contact;
-use blindgrasp::plant::dynamics::{Body, JointVector, bias_torques, mass_matrix, place_bodies};
-use blindgrasp::plant::friction::JointFriction;
 use blindgrasp::plant::{ContactForce, Motion, Plant};
-use blindgrasp::{MAX_JOINTS, Posture};
 use blindgrasp_tests::grasps::{FRICTION, Grasp, cube, prism};
 use blindgrasp_tests::hands::{on_arm, on_forked_arm, three_finger};
 use blindgrasp_tests::numeric::{Errors, order};

@@ -1,9 +1,9 @@
 //! Dynamics of the hand and of the free object: identities between algorithms, and motions that conserve something.
 
-use blindgrasp::plant::dynamics::{Body, JointMatrix, JointVector, bias_torques, mass_matrix, place_bodies};
-use blindgrasp::plant::polyhedron::Polyhedron;
+use blindgrasp::body::dynamics::{Body, JointMatrix, JointVector, bias_torques, mass_matrix, place_bodies};
+use blindgrasp::body::polyhedron::Polyhedron;
+use blindgrasp::body::{Hand, MAX_JOINTS, Posture};
 use blindgrasp::plant::{Motion, ObjectModel, Plant, PlantModel};
-use blindgrasp::{Hand, MAX_JOINTS, Posture};
 use blindgrasp_shared::math::Real;
 use blindgrasp_tests::description::{Description, axial};
 use blindgrasp_tests::grasps::GRAVITY_M_S2;

@@ -1,7 +1,7 @@
 //! The earlier law (the paper's references 14 and 15), `u_I = -K_I` times the integral of each joint's velocity: against its
 //! potential, against the integral as it was defined, and against what the paper says speaks for its own law instead.
 
-use blindgrasp::scene::Scene;
+use blindgrasp::model::Scene;
 use blindgrasp::sim::Simulation;
 use blindgrasp_shared::control::PerGain;
 use blindgrasp_tests::cases::{Case, JOINTS, K_I_NM_RAD, K_ST_NM, Torques, cases};

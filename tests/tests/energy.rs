@@ -1,8 +1,8 @@
 //! The plant's ledger: stored energy, what dampers and friction take, and the work of the motors make a whole in every built-in
 //! scene, and what is missing is the integrator's error.
 
-use blindgrasp::record::sample::{EnergySample, Sample};
-use blindgrasp::scene::Scene;
+use blindgrasp::model::Scene;
+use blindgrasp::sim::sample::{EnergySample, Sample};
 use blindgrasp::sim::{Run, Simulation};
 use blindgrasp_tests::numeric::order;
 

@@ -8,9 +8,9 @@ use std::path::{Path, PathBuf};
 /// The numbered equations of the paper.
 const LAST: u32 = 59;
 /// Where code may be that is named without these folders: as the page says.
-const CODE: [&str; 4] = ["", "host/src", "shared/src", "tests/src"];
+const CODE: [&str; 3] = ["", "shared/src", "tests/src"];
 /// Where tests may be.
-const TESTS: [&str; 4] = ["", "tests/tests", "host/src", "host/tests"];
+const TESTS: [&str; 3] = ["", "tests/tests", "host/tests"];
 
 fn root() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("..")
@@ -55,11 +55,11 @@ fn quoted(cell: &str) -> impl Iterator<Item = &str> {
 }
 
 /// The text of a file that is named from the top or without one of some folders; empty for a folder, and for files whose names
-/// have a `*`. `shared/x.rs` stands for `shared/src/x.rs`.
+/// have a `*`. `shared/x.rs` stands for `shared/src/x.rs`, and `plant/x.rs` for `host/plant/src/x.rs`.
 fn open(name: &str, folders: &[&str]) -> Option<String> {
-    let short = name.strip_prefix("shared/");
+    let (room, rest) = name.split_once('/').unwrap_or(("", name));
     let paths = folders.iter().map(|folder| root().join(folder).join(name));
-    let paths = paths.chain(short.map(|short| root().join("shared/src").join(short)));
+    let paths = paths.chain(["", "host"].map(|above| root().join(above).join(room).join("src").join(rest)));
     let found = |path: &Path| {
         if path.is_dir() {
             return Some(String::new());

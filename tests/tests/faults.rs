@@ -15,8 +15,8 @@
 //! The simulated world ends when a fingertip leaves the object, a few milliseconds after the torque is gone. What a hand
 //! without an object does then is not simulated; its energy is what is measured here.
 
-use blindgrasp::MAX_JOINTS;
-use blindgrasp::scene::Scene;
+use blindgrasp::body::MAX_JOINTS;
+use blindgrasp::model::Scene;
 use blindgrasp::sim::injection::Kind;
 use blindgrasp_shared::command::{Command, Grasp};
 use blindgrasp_shared::fault::{Fault, Raised, Reaction};
@@ -296,7 +296,7 @@ fn bent(joint: usize, torque_nm: f32) -> Course {
 }
 
 /// The first sample of which something is true, as a tick.
-fn since(outcome: &Outcome, is_so: impl FnMut(&blindgrasp::record::sample::Sample) -> bool) -> u64 {
+fn since(outcome: &Outcome, is_so: impl FnMut(&blindgrasp::sim::sample::Sample) -> bool) -> u64 {
     outcome.run.samples.iter().position(is_so).expect("it comes to that") as u64
 }
 

@@ -1,7 +1,7 @@
 //! The paper's simulation (Sec. 5): do the shipped hand-arm and its object have the numbers of Tables I to III, do these fit
 //! together, and what comes of them?
 
-use blindgrasp::scene::{HandFile, Scene};
+use blindgrasp::model::{HandFile, Scene};
 use blindgrasp::sim::summary::Summary;
 use blindgrasp::sim::{Run, Simulation};
 use blindgrasp_tests::description::rodrigues;

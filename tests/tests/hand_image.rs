@@ -6,9 +6,9 @@
 //! QEMU has the SPI controllers, but nothing is connected to them: no counter answers.
 #![cfg(unix)]
 
-use blindgrasp::scene::HandModel;
+use blindgrasp::body::{MAX_FINGERS, MAX_JOINTS};
+use blindgrasp::model::HandModel;
 use blindgrasp::wire::{Packet, Request};
-use blindgrasp::{MAX_FINGERS, MAX_JOINTS};
 use blindgrasp_shared::command::{Command, Grasp, Refusal};
 use blindgrasp_shared::control::PerGain;
 use blindgrasp_shared::event::Event;

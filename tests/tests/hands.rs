@@ -1,9 +1,9 @@
 //! Every shipped hand holds something, and where joints have friction it comes to rest with the forces of Eq. 57.
 
-use blindgrasp::scene::file::{Safety, SafetyKey};
-use blindgrasp::scene::{HandFile, Scene};
+use blindgrasp::body::{MAX_JOINTS, Posture};
+use blindgrasp::model::file::{Safety, SafetyKey};
+use blindgrasp::model::{HandFile, Scene};
 use blindgrasp::sim::{Run, Simulation};
-use blindgrasp::{MAX_JOINTS, Posture};
 use blindgrasp_tests::generated;
 
 /// Scenes that are there to show how an object is lost.
@@ -29,7 +29,7 @@ fn held_by_friction_n(scene: &Scene, run: &Run) -> Vec<f64> {
     angles[..last.angles_rad.len()].copy_from_slice(&last.angles_rad);
     let mut posture = Posture::at_base();
     scene.hand.forward_kinematics(&angles, &mut posture);
-    let held = |(finger, contact): (usize, &blindgrasp::record::sample::ContactSample)| {
+    let held = |(finger, contact): (usize, &blindgrasp::sim::sample::ContactSample)| {
         let (linear, _) = scene.hand.jacobians(&posture, finger);
         let normal = contact.frame.column(1);
         let each =

@@ -1,6 +1,6 @@
 //! The integrator: its order, the energy that it keeps, and that it stays stable where it is coarse.
 
-use blindgrasp::plant::contact::FingertipModel;
+use blindgrasp::body::FingertipModel;
 use blindgrasp::plant::{Motion, Plant};
 use blindgrasp_tests::books::contact_power_w;
 use blindgrasp_tests::grasps::{DAMPING_NM_S, FINGERTIP, Grasp, Held, cube, prism};

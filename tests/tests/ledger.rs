@@ -1,8 +1,8 @@
 //! The energy ledger of the tick against the simulated world: is its work that of the motors, do the books close, and does
 //! its excess tell a hand that swings up from one that does not.
 
-use blindgrasp::scene::Scene;
-use blindgrasp::{MAX_JOINTS, Posture};
+use blindgrasp::body::{MAX_JOINTS, Posture};
+use blindgrasp::model::Scene;
 use blindgrasp_shared::fault::{Fault, Raised};
 use blindgrasp_tests::books::{Page, keep, true_excess_j};
 use blindgrasp_tests::generated;

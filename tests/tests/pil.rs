@@ -6,13 +6,13 @@
 #![cfg(unix)]
 
 use blindgrasp::device::client::{Client, Patience};
-use blindgrasp::device::pil::{Linked, Pilot, Plan};
 use blindgrasp::device::qemu::{Emulated, Qemu};
 use blindgrasp::device::transport::Transport;
-use blindgrasp::device::twin::Twin;
-use blindgrasp::record::sample::Sample as PlantSample;
-use blindgrasp::scene::Scene;
+use blindgrasp::model::Scene;
+use blindgrasp::rig::pil::{Linked, Pilot, Plan};
+use blindgrasp::rig::twin::Twin;
 use blindgrasp::sim::injection::{Injection, Kind};
+use blindgrasp::sim::sample::Sample as PlantSample;
 use blindgrasp::sim::{Run, Simulation};
 use blindgrasp::wire::{Answer, Packet, Request, Sample};
 use blindgrasp_shared::command::{Command, Grasp, Refusal};

@@ -1,9 +1,9 @@
 //! Pinocchio computes the same of every built-in hand, from the URDF that we write of it; and with its algorithms the plant
 //! accelerates as it should.
 
-use blindgrasp::plant::dynamics::{Body, JointMatrix, bias_torques, mass_matrix, place_bodies};
-use blindgrasp::scene::{HandFile, Scene};
-use blindgrasp::{Hand, MAX_JOINTS, Posture};
+use blindgrasp::body::dynamics::{Body, JointMatrix, bias_torques, mass_matrix, place_bodies};
+use blindgrasp::body::{Hand, MAX_JOINTS, Posture};
+use blindgrasp::model::{HandFile, Scene};
 use blindgrasp_tests::random::Draw;
 use blindgrasp_tests::rolling::{State, trunk, velocities};
 use nalgebra::{Matrix3, Vector3};

@@ -1,10 +1,12 @@
 //! The paper's title: an *arbitrary* polyhedral object. Random polyhedra, and meshes with noise, placed in the paper's hand and
 //! grasped in the paper's own model for 5 s, with `u_st` and without.
 
-use blindgrasp::placement::{Reach, Request, place, template};
-use blindgrasp::population::{DENSITY_KG_M3, Draw, EXTENT_M, RandomPolyhedron, SEED, polyhedra, polyhedron};
-use blindgrasp::scene::file::FingertipFile;
-use blindgrasp::scene::{HandFile, ObjectFile, Parts};
+use blindgrasp::model::file::FingertipFile;
+use blindgrasp::model::{HandFile, ObjectFile, Parts};
+use blindgrasp::place::population::{
+    DENSITY_KG_M3, Draw, EXTENT_M, RandomPolyhedron, SEED, polyhedra, polyhedron,
+};
+use blindgrasp::place::{Reach, Request, place, template};
 use blindgrasp_shared::math::Real;
 use blindgrasp_tests::noise::noisy_stl;
 use blindgrasp_tests::study::{Outcome, Runs, Specimen, Study, simulate, spread};
@@ -258,7 +260,7 @@ fn terms_of_the_quality_predict_the_outcome() {
     let runs: Vec<_> = runs.into_iter().flatten().collect();
     let held = runs.iter().filter(|(_, held)| *held).count();
     println!("{} placements, one of up to 12 of each object; {held} held", runs.len());
-    type Term = (&'static str, fn(&blindgrasp::placement::Quality) -> f64);
+    type Term = (&'static str, fn(&blindgrasp::place::Quality) -> f64);
     let terms: [Term; 8] = [
         ("chance", |q| q.chance),
         ("mean square turn", |q| -q.fingertips.iter().map(|tip| tip.turn_rad * tip.turn_rad).sum::<f64>()),
@@ -280,10 +282,7 @@ fn terms_of_the_quality_predict_the_outcome() {
 }
 
 /// The probability that a placement that held has more of something than one that was lost.
-fn area(
-    runs: &[(blindgrasp::placement::Quality, bool)],
-    term: fn(&blindgrasp::placement::Quality) -> f64,
-) -> f64 {
+fn area(runs: &[(blindgrasp::place::Quality, bool)], term: fn(&blindgrasp::place::Quality) -> f64) -> f64 {
     let (mut wins, mut pairs) = (0.0, 0.0);
     for (held, _) in runs.iter().filter(|(_, held)| *held) {
         for (lost, _) in runs.iter().filter(|(_, held)| !held) {

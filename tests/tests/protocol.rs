@@ -4,8 +4,8 @@
 //!
 //!     cargo test --release -p blindgrasp-tests --test protocol -- --show-output
 
-use blindgrasp::MAX_JOINTS;
-use blindgrasp::scene::HandModel;
+use blindgrasp::body::MAX_JOINTS;
+use blindgrasp::model::HandModel;
 use blindgrasp_shared::command::{Answer, Command, Grasp, Refusal};
 use blindgrasp_shared::control::{GAINS, Gain, LAWS, PerGain, PerSignal, SIGNALS, Signal};
 use blindgrasp_shared::event::{Event, Events};

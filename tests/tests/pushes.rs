@@ -1,9 +1,10 @@
 //! What pushes the object from outside (`[[plant.push]]`): the books close with its work, and it moves what it should.
 
-use blindgrasp::plant::dynamics::JointVector;
-use blindgrasp::plant::{Motion, Plant, Push};
-use blindgrasp::scene::Scene;
-use blindgrasp::scene::file::PushFile;
+use blindgrasp::body::Push;
+use blindgrasp::body::dynamics::JointVector;
+use blindgrasp::model::Scene;
+use blindgrasp::model::file::PushFile;
+use blindgrasp::plant::{Motion, Plant};
 use blindgrasp::sim::{Simulation, model};
 use blindgrasp_shared::math::Real;
 use nalgebra::{Matrix3, Vector3};
@@ -63,7 +64,7 @@ fn a_free_object_takes_the_impulse() {
         let (force_n, moment_nm) = (Vector3::new(0.01, -0.02, 0.03), Vector3::new(1e-6, 2e-6, -3e-6));
         free.pushes = vec![Push { from_s: 0.0123, for_s: 0.1, rise_s, force_n, moment_nm }];
         let (mass_kg, inertia) = (free.object.mass_kg, free.object.inertia_kg_m2);
-        let still: JointVector = [0.0; blindgrasp::MAX_JOINTS];
+        let still: JointVector = [0.0; blindgrasp::body::MAX_JOINTS];
         let start = Motion::at_rest(still, scene.start.position_m, scene.start.attitude);
         let mut plant = Plant::new(free, start, substep_s).expect("a plant");
         for _ in 0..(0.3 / substep_s) as usize {

@@ -127,7 +127,7 @@ fn bad_input_is_told() {
 #[cfg(feature = "firmware")]
 mod emulated {
     use super::*;
-    use blindgrasp::scene::HandModel;
+    use blindgrasp::model::HandModel;
     use blindgrasp_tests::images::{DEFAULT_HAND, kept_image};
     use std::path::Path;
     use std::process::Child;

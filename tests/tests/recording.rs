@@ -5,7 +5,7 @@
 //! That every tick of a hand in real time is recorded, `host/tests/record.rs` shows, with processes.
 #![cfg(unix)]
 
-use blindgrasp::MAX_JOINTS;
+use blindgrasp::body::MAX_JOINTS;
 use blindgrasp::device::client::Patience;
 use blindgrasp::device::recorder;
 use blindgrasp::device::talk::Talk;

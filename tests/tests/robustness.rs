@@ -1,6 +1,6 @@
 //! Whatever numbers a scene file has: it is refused in words, or it runs, and what comes out is numbers.
 
-use blindgrasp::scene::Scene;
+use blindgrasp::model::Scene;
 use blindgrasp::sim::Simulation;
 use blindgrasp_tests::random::Draw;
 use std::path::Path;

@@ -1,6 +1,6 @@
 //! What a right implementation of the paper shows: the shipped scenes, run as `blindgrasp sim` runs them.
 
-use blindgrasp::scene::Scene;
+use blindgrasp::model::Scene;
 use blindgrasp::sim::summary::Summary;
 use blindgrasp::sim::{Run, Simulation};
 
@@ -113,7 +113,7 @@ fn half_the_substep_changes_nothing() {
 fn runs_are_reproducible() {
     let trace = |settings: &[&str]| {
         let mut bytes = Vec::new();
-        blindgrasp::record::csv::write(&mut bytes, &run("cube", settings).samples).expect("memory");
+        blindgrasp::sim::csv::write(&mut bytes, &run("cube", settings).samples).expect("memory");
         bytes
     };
     assert!(trace(&[]) == trace(&[]), "the trace of cube");

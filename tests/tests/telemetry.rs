@@ -3,10 +3,10 @@
 //!
 //!     cargo test --release -p blindgrasp-tests --test telemetry -- --show-output
 
-use blindgrasp::scene::{HandModel, Scene};
+use blindgrasp::body::{MAX_FINGERS, MAX_JOINTS};
+use blindgrasp::model::{HandModel, Scene};
 use blindgrasp::sim::Simulation;
 use blindgrasp::sim::controller::{Controller, Stepped, Turn};
-use blindgrasp::{MAX_FINGERS, MAX_JOINTS};
 use blindgrasp_shared::command::{Command, Grasp};
 use blindgrasp_shared::device::{Device, Inputs, Outputs, WAITING_MOST};
 use blindgrasp_shared::fault::{Fault, FaultConfig, Raised};

@@ -1,6 +1,6 @@
 //! Another hand: two opposed fingers of four joints hold a hexagonal prism.
 
-use blindgrasp::scene::Scene;
+use blindgrasp::model::Scene;
 use blindgrasp::sim::Simulation;
 use blindgrasp::sim::summary::Summary;
 

@@ -1,8 +1,8 @@
 //! Hands that are read from URDFs: against the same URDFs, link by link; and what is written, read again.
 
-use blindgrasp::plant::dynamics::{Body, JointMatrix, bias_torques, mass_matrix, place_bodies};
-use blindgrasp::scene::HandFile;
-use blindgrasp::{Hand, MAX_JOINTS, Posture};
+use blindgrasp::body::dynamics::{Body, JointMatrix, bias_torques, mass_matrix, place_bodies};
+use blindgrasp::body::{Hand, MAX_JOINTS, Posture};
+use blindgrasp::model::HandFile;
 use blindgrasp_tests::numeric::Errors;
 use blindgrasp_tests::random::Draw;
 use blindgrasp_tests::urdf::RawRobot;

@@ -5,7 +5,7 @@ use anyhow::{Context, anyhow, bail};
 use blindgrasp::device::recorder::{ENDED_ANOTHER, Recorder, Recording};
 use blindgrasp::device::talk::{self, Event, SELDOM, Talk, TalkError, telemetry};
 use blindgrasp::device::transport::{Transport, TransportError};
-use blindgrasp::scene::HandModel;
+use blindgrasp::model::HandModel;
 use blindgrasp::wire::{Answer, Firmware, Record, Request, label, potentials, scalars, take_encoder};
 use blindgrasp_shared::command::{self, Command, Grasp, Refusal};
 use blindgrasp_shared::control::{GAIN_COUNT, GAINS};

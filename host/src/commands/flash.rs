@@ -77,7 +77,7 @@ mod probe {
     use blindgrasp::device::flash::{Chip, Phase, Progress, download};
     use blindgrasp::device::image::{BUILD_HINT, ExpectedHand, Firmware, Footprint, Kind};
     use blindgrasp::device::options;
-    use blindgrasp::scene::HandModel;
+    use blindgrasp::model::HandModel;
     use indicatif::{ProgressBar, ProgressStyle};
     use probe_rs::probe::list::Lister;
     use serde::Serialize;

@@ -6,7 +6,7 @@ use blindgrasp::paper::claim::{Claim, Verdict};
 use blindgrasp::paper::expected::Surprise;
 use blindgrasp::paper::files;
 use blindgrasp::paper::report::{self, Paper};
-use blindgrasp::record::run_dir::RunDir;
+use blindgrasp::sim::run_dir::RunDir;
 use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 use std::fmt::Write as _;

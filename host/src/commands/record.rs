@@ -146,7 +146,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
         bail!("--port: one is named twice");
     }
     if let Some(unknown) =
-        arguments.hands.iter().find_map(|hand| blindgrasp::scene::HandModel::load(hand).err())
+        arguments.hands.iter().find_map(|hand| blindgrasp::model::HandModel::load(hand).err())
     {
         return Err(unknown.into());
     }

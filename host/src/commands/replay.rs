@@ -3,9 +3,9 @@
 use super::Outcome;
 use super::recording::{Span, chosen_device, damage_of, reading_bar, start_ns};
 use anyhow::Context;
+use blindgrasp::model::HandModel;
 use blindgrasp::record::mcap::Recording;
 use blindgrasp::record::replay::{Change, Report, Wanted, replay};
-use blindgrasp::scene::HandModel;
 use clap::Args;
 use serde::Serialize;
 use std::io::{self, Write as _};

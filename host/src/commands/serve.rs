@@ -3,11 +3,11 @@
 use super::Outcome;
 use anyhow::{Context, bail};
 use blindgrasp::device::interrupt;
-use blindgrasp::device::line::Line;
-use blindgrasp::device::pty::{Link, Pty};
-use blindgrasp::device::serve::{News, Served, serve};
-use blindgrasp::device::simulated::{Happening, SimulatedHand};
-use blindgrasp::scene::Scene;
+use blindgrasp::model::Scene;
+use blindgrasp::rig::line::Line;
+use blindgrasp::rig::pty::{Link, Pty};
+use blindgrasp::rig::serve::{News, Served, serve};
+use blindgrasp::rig::simulated::{Happening, SimulatedHand};
 use blindgrasp_shared::link::rate::FIRST_BAUD;
 use clap::Args;
 use std::io::{self, Write as _};

@@ -2,13 +2,14 @@
 
 use super::Outcome;
 use anyhow::Context;
+use blindgrasp::model::Scene;
 use blindgrasp::record::mcap::RecordingError;
-use blindgrasp::record::run_dir::RunDir;
-use blindgrasp::scene::Scene;
+use blindgrasp::sim::csv;
 use blindgrasp::sim::recorder::Recorder;
+use blindgrasp::sim::run_dir::RunDir;
 use blindgrasp::sim::summary::Summary;
 use blindgrasp::sim::{Run, Simulation};
-use blindgrasp::{record, report};
+use blindgrasp::view;
 use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 use std::fmt::Write as _;
@@ -107,16 +108,16 @@ fn write_files(directory: &RunDir, scene: &Scene, run: &Run) -> anyhow::Result<(
     let summary = serde_json::to_string_pretty(&run.summary)? + "\n";
     directory.write("summary.json", |file| file.write_all(summary.as_bytes()))?;
     directory.write("scene.toml", |file| file.write_all(scene.effective_toml().as_bytes()))?;
-    directory.write("trace.csv", |file| record::csv::write(file, &run.samples).map_err(io::Error::other))?;
+    directory.write("trace.csv", |file| csv::write(file, &run.samples).map_err(io::Error::other))?;
     let joint_names: Vec<String> = scene.joints.iter().map(|joint| joint.name.clone()).collect();
-    let report = report::Report {
+    let report = view::Report {
         title: &scene.name,
         hand: &scene.hand,
         joint_names: &joint_names,
         object: &scene.object,
         samples: &run.samples,
     };
-    report::write(directory.path(), &report)?;
+    view::write(directory.path(), &report)?;
     Ok(())
 }
 

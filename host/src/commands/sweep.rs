@@ -3,8 +3,8 @@
 use super::Outcome;
 use anyhow::{Context, bail};
 use blindgrasp::device::interrupt;
+use blindgrasp::model::Setting;
 use blindgrasp::record::table::Kind;
-use blindgrasp::scene::Setting;
 use blindgrasp::sweep::{
     self, Axis, Edge, Identity, Journal, Output, Overview, Plan, Row, Swept, Value, Varied,
 };

@@ -1,11 +1,11 @@
 //! What holds of any bytes that are given to a reader: they are refused in one line, or what they describe can be written
 //! and read again as the same. Shared with the fuzz targets (`fuzz/`).
 
-use blindgrasp::inspect::hand::HandCheck;
-use blindgrasp::inspect::object::{ObjectCheck, Wanted};
-use blindgrasp::scene::file::{ObjectFile, SCHEMA};
-use blindgrasp::scene::mesh::{self, Unit};
-use blindgrasp::scene::{HandFile, Scene, SceneError, StarterRequest};
+use blindgrasp::model::file::{ObjectFile, SCHEMA};
+use blindgrasp::model::inspect::hand::HandCheck;
+use blindgrasp::model::inspect::object::{ObjectCheck, Wanted};
+use blindgrasp::model::mesh::{self, Unit};
+use blindgrasp::model::{HandFile, Scene, SceneError, StarterRequest};
 use std::fs;
 use std::path::Path;
 

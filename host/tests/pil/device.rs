@@ -1,11 +1,11 @@
 //! A firmware without a processor: the device of `blindgrasp-shared` behind a transport, in lockstep as in the image
 //! `pil`; and what can be wrong with it and with the line.
 
+use blindgrasp::body::{MAX_FINGERS, MAX_JOINTS};
 use blindgrasp::device::client::Patience;
 use blindgrasp::device::transport::{Transport, TransportError};
-use blindgrasp::scene::{HandModel, Scene};
+use blindgrasp::model::{HandModel, Scene};
 use blindgrasp::wire::{Packet, Record, Request, Sample};
-use blindgrasp::{MAX_FINGERS, MAX_JOINTS};
 use blindgrasp_shared::command::Refusal;
 use blindgrasp_shared::device::{Device, Inputs};
 use blindgrasp_shared::identity::{Clock, Identity, Image};

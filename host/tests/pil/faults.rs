@@ -2,11 +2,11 @@
 
 use crate::device::{Firmware, PATIENCE, Wrong};
 use blindgrasp::device::client::Client;
-use blindgrasp::device::pil::{Linked, Peer, Pilot, Plan};
-use blindgrasp::device::twin::Twin;
-use blindgrasp::record::sample::Sample;
-use blindgrasp::scene::Scene;
+use blindgrasp::model::Scene;
+use blindgrasp::rig::pil::{Linked, Peer, Pilot, Plan};
+use blindgrasp::rig::twin::Twin;
 use blindgrasp::sim::injection::{Injection, Kind};
+use blindgrasp::sim::sample::Sample;
 use blindgrasp::sim::{Run, Simulation};
 use blindgrasp_shared::fault::{Fault, Raised};
 use blindgrasp_shared::identity::Clock;

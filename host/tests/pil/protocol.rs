@@ -2,9 +2,9 @@
 
 use crate::device::{Firmware, PATIENCE, Wrong};
 use blindgrasp::device::client::Client;
-use blindgrasp::device::pil::{Linked, PilError, Pilot, Plan};
+use blindgrasp::model::Scene;
 use blindgrasp::record::compare::Value;
-use blindgrasp::scene::Scene;
+use blindgrasp::rig::pil::{Linked, PilError, Pilot, Plan};
 use blindgrasp::sim::{Run, Simulation};
 use blindgrasp_shared::parameters::Parameter;
 use std::time::{Duration, Instant};

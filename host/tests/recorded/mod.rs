@@ -3,9 +3,9 @@
 #![allow(dead_code, reason = "each test file uses its part")]
 #![allow(clippy::unwrap_used, reason = "only tests use it")]
 
+use blindgrasp::body::{MAX_FINGERS, MAX_JOINTS};
+use blindgrasp::model::{HandFile, HandModel};
 use blindgrasp::record::mcap::{About, Device as Recorded, Saved, Setting, Stamp, Writer};
-use blindgrasp::scene::{HandFile, HandModel};
-use blindgrasp::{MAX_FINGERS, MAX_JOINTS};
 use blindgrasp_shared::command::Command;
 use blindgrasp_shared::device::{Device, Inputs};
 use blindgrasp_shared::fault::Raised;

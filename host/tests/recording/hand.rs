@@ -1,8 +1,8 @@
 //! A hand that talks at random.
 
-use blindgrasp::MAX_JOINTS;
+use blindgrasp::body::MAX_JOINTS;
+use blindgrasp::model::{HandFile, HandModel};
 use blindgrasp::record::mcap::{About, Entry, Record, Recording, Setting, What};
-use blindgrasp::scene::{HandFile, HandModel};
 use blindgrasp_shared::command::{Answer, Command, Refusal};
 use blindgrasp_shared::control::PerGain;
 use blindgrasp_shared::event::{Event, Events};
@@ -44,7 +44,8 @@ pub(crate) fn about(hand: &str) -> About {
 /// All parameters of a hand.
 pub(crate) fn settings(hand: &str) -> Vec<Setting> {
     let model = HandModel::load(hand).unwrap();
-    let params = Params::<MAX_JOINTS, { blindgrasp::MAX_FINGERS }>::new(model.hand.cast(), &model.config);
+    let params =
+        Params::<MAX_JOINTS, { blindgrasp::body::MAX_FINGERS }>::new(model.hand.cast(), &model.config);
     Setting::all(&params.unwrap())
 }
 

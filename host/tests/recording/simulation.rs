@@ -1,11 +1,11 @@
 //! A simulation leaves the recording that its hand would.
 
 use crate::hand::read;
+use blindgrasp::body::{MAX_FINGERS, MAX_JOINTS};
+use blindgrasp::model::Scene;
 use blindgrasp::record::mcap::{Decoded, Decoder, What};
-use blindgrasp::scene::Scene;
 use blindgrasp::sim::Simulation;
 use blindgrasp::sim::recorder::Recorder;
-use blindgrasp::{MAX_FINGERS, MAX_JOINTS};
 use blindgrasp_shared::link::message::Reply;
 use blindgrasp_shared::telemetry::snapshot::Collector;
 use blindgrasp_shared::tick::{Params, State};

@@ -2,9 +2,9 @@
 
 use super::super::Outcome;
 use anyhow::Context;
-use blindgrasp::inspect::finding::Verdict;
-use blindgrasp::inspect::hand::{HandCheck, NominalHand};
-use blindgrasp::report;
+use blindgrasp::model::inspect::finding::Verdict;
+use blindgrasp::model::inspect::hand::{HandCheck, NominalHand};
+use blindgrasp::view;
 use clap::Args;
 use std::io::{self, Write as _};
 use std::path::PathBuf;
@@ -35,7 +35,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
     if let Some(path) = &arguments.picture {
         match &check.nominal {
             Some(NominalHand { hand, joint_names, angles_rad }) => {
-                let svg = report::hand_svg(&check.name, hand, joint_names, angles_rad);
+                let svg = view::hand_svg(&check.name, hand, joint_names, angles_rad);
                 std::fs::write(path, svg).with_context(|| format!("cannot write {}", path.display()))?;
                 eprintln!("blindgrasp: wrote {}", path.display());
             }

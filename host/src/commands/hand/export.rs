@@ -3,7 +3,7 @@
 use super::super::Outcome;
 use super::super::output::write_new;
 use anyhow::Context;
-use blindgrasp::scene::HandFile;
+use blindgrasp::model::HandFile;
 use clap::Args;
 use std::io::{self, Write};
 use std::path::PathBuf;

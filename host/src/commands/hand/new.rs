@@ -3,7 +3,7 @@
 use super::super::Outcome;
 use super::super::output::write_new;
 use anyhow::{Context, bail};
-use blindgrasp::scene::{FingertipRequest, StarterRequest};
+use blindgrasp::model::{FingertipRequest, StarterRequest};
 use clap::Args;
 use std::path::{Component, Path, PathBuf};
 

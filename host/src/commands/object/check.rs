@@ -2,10 +2,10 @@
 
 use super::super::Outcome;
 use anyhow::Context;
-use blindgrasp::inspect::finding::Verdict;
-use blindgrasp::inspect::object::{ObjectCheck, Wanted};
-use blindgrasp::report;
-use blindgrasp::scene::mesh::Unit;
+use blindgrasp::model::inspect::finding::Verdict;
+use blindgrasp::model::inspect::object::{ObjectCheck, Wanted};
+use blindgrasp::model::mesh::Unit;
+use blindgrasp::view;
 use clap::Args;
 use std::io::{self, Write as _};
 use std::path::PathBuf;
@@ -47,7 +47,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
     if let Some(path) = &arguments.picture {
         match &check.shape {
             Some(shape) => {
-                let svg = report::object_svg(shape, &check.name);
+                let svg = view::object_svg(shape, &check.name);
                 std::fs::write(path, svg).with_context(|| format!("cannot write {}", path.display()))?;
                 eprintln!("blindgrasp: wrote {}", path.display());
             }

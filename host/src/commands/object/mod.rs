@@ -4,8 +4,8 @@ mod check;
 mod new;
 
 use super::Outcome;
-use blindgrasp::scene::mesh::Unit;
-use blindgrasp::scene::suggestion;
+use blindgrasp::model::mesh::Unit;
+use blindgrasp::model::suggestion;
 use clap::{Args, Subcommand};
 
 /// Objects: check one; make one from an STL or OBJ file

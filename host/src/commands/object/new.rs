@@ -2,10 +2,10 @@
 
 use super::super::Outcome;
 use anyhow::{Context, bail};
-use blindgrasp::inspect::finding::{Severity, Verdict};
-use blindgrasp::inspect::object::{ObjectCheck, Wanted};
-use blindgrasp::scene::ObjectFile;
-use blindgrasp::scene::mesh::{Unit, is_mesh};
+use blindgrasp::model::ObjectFile;
+use blindgrasp::model::inspect::finding::{Severity, Verdict};
+use blindgrasp::model::inspect::object::{ObjectCheck, Wanted};
+use blindgrasp::model::mesh::{Unit, is_mesh};
 use clap::Args;
 use std::path::{Path, PathBuf};
 

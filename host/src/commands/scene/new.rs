@@ -3,9 +3,9 @@
 use super::show;
 use crate::commands::{Outcome, output};
 use anyhow::{Context, bail};
-use blindgrasp::placement::{NoPlacement, Reach, Request, place, scene_text, template};
-use blindgrasp::scene::file::{ContactFile, SceneFile};
-use blindgrasp::scene::{HandFile, ObjectFile, Parts, suggestion};
+use blindgrasp::model::file::{ContactFile, SceneFile};
+use blindgrasp::model::{HandFile, ObjectFile, Parts, suggestion};
+use blindgrasp::place::{NoPlacement, Reach, Request, place, scene_text, template};
 use clap::Args;
 use std::collections::BTreeMap;
 use std::io::{self, Write as _};

@@ -1,7 +1,7 @@
 //! Placements, and why there is none, as text and as JSON.
 
-use blindgrasp::placement::{Placement, Refusal};
-use blindgrasp::scene::file::SceneFile;
+use blindgrasp::model::file::SceneFile;
+use blindgrasp::place::{Placement, Refusal};
 use serde_json::{Value, json};
 use std::fmt::Write as _;
 use std::path::Path;
@@ -19,7 +19,7 @@ pub(super) fn text(placements: &[Placement]) -> String {
         );
         for (k, placement) in placements.iter().enumerate() {
             let quality = &placement.quality;
-            let most = |value: fn(&blindgrasp::placement::FingertipQuality) -> f64| {
+            let most = |value: fn(&blindgrasp::place::FingertipQuality) -> f64| {
                 quality.fingertips.iter().map(value).fold(0.0, f64::max)
             };
             let margin_m = quality.fingertips.iter().map(|tip| tip.margin_m).fold(f64::INFINITY, f64::min);

@@ -1,0 +1,56 @@
+//! Properties of the parts: numbers that a scene gives, and a plant acts on.
+
+use nalgebra::{Matrix3, Vector3};
+
+/// What a fingertip is made of.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FingertipModel {
+    /// Radius `r_i`, m.
+    pub radius_m: f64,
+    /// Elastic coefficient `k_i` of Eq. 14, N/m^2.
+    pub stiffness_n_m2: f64,
+    /// Damping `xi_i` for each square metre of contact area, N s/m^3.
+    pub damping_n_s_m3: f64,
+    /// Torsional viscosity `b_i` for each square metre of contact area, N m s/rad/m^2 = N s/m.
+    pub torsion_n_s_m: f64,
+}
+
+/// The face that a fingertip rolls on, for the whole run (the paper's assumption 3).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FaceContact {
+    /// Index of the face.
+    pub face: usize,
+    /// Contact frame `R_Ci` in the object frame (Eq. 3): columns `C_X`, `C_Y` (unit normal **into** the object), `C_Z`,
+    /// with `C_X x C_Y = C_Z`.
+    pub frame: Matrix3<f64>,
+    /// Distance `Y_i` of the face from the object's centre of mass, m.
+    pub distance_m: f64,
+}
+
+/// Friction of one joint; zero in the paper's model.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct JointFriction {
+    /// Viscous coefficient, N m s/rad.
+    pub viscous_nm_s: f64,
+    /// Coulomb torque, N m.
+    pub coulomb_nm: f64,
+    /// Displacement at which a joint begins to slide, rad; positive wherever the Coulomb torque is.
+    pub presliding_rad: f64,
+    /// Damping of a joint that sticks, N m s/rad (`sigma_1` of the LuGre family).
+    pub presliding_damping_nm_s: f64,
+}
+
+/// A force and a moment on the object, for a while.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Push {
+    /// When it begins, s from the plant's start.
+    pub from_s: f64,
+    /// How long it lasts, s.
+    pub for_s: f64,
+    /// Time in which it rises at its beginning, and falls at its end, s; at most half of its length.
+    pub rise_s: f64,
+    /// Force at the centre of mass, base axes, N.
+    pub force_n: Vector3<f64>,
+    /// Moment, base axes, N m.
+    pub moment_nm: Vector3<f64>,
+}

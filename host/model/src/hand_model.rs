@@ -1,0 +1,190 @@
+//! A hand without a scene: what its firmware is built with.
+
+use super::Scene;
+use super::{
+    build::control,
+    check::{Result, fail, name, schema},
+    controller::Setup,
+    error::{Notice, Place, SceneError},
+    file::{Actuators, HandFile, JointFile, PlantSettings, Sensors},
+    hand::{hand, kinematics},
+    library::{Document, Kind, is_path},
+};
+use blindgrasp_body::{Hand, MAX_JOINTS};
+use blindgrasp_shared::model;
+use blindgrasp_shared::tick::{Config, Params};
+use std::path::{Path, PathBuf};
+
+/// Bytes that the largest hand and its configuration take: 250 a joint are more than enough.
+const MODEL_BYTES: usize = 1000 + 250 * MAX_JOINTS;
+
+/// A hand, checked, with the configuration that its file asks for: the gains of `[control]`, the numbers of `[safety]`, and all
+/// limits and faults that a real hand has. Gravity is along `-z` of the base: the palm looks up.
+#[derive(Clone, Debug, PartialEq)]
+pub struct HandModel {
+    /// Its name.
+    pub name: String,
+    /// Kinematics and link masses.
+    pub hand: Hand,
+    /// Names of the joints, in the hand's order.
+    pub joint_names: Vec<String>,
+    /// The controller's configuration; zero beyond the hand's joints.
+    pub config: Config<MAX_JOINTS>,
+    /// Torque at each joint for each volt at its amplifier, N m/V.
+    pub torques_per_volt_nm_v: Vec<f32>,
+    /// What is odd but can be used, in words.
+    pub warnings: Vec<String>,
+}
+
+impl HandModel {
+    /// Loads a hand by its built-in name or by its path, which ends in `.toml` or contains a separator. Its file needs the
+    /// table `[control]`.
+    ///
+    /// # Errors
+    /// One line: where, which key, what is wrong, what to do.
+    pub fn load(name_or_path: &str) -> std::result::Result<Self, SceneError> {
+        Self::load_with_file(name_or_path).map(|(model, _)| model)
+    }
+
+    /// The same, with all that its file says.
+    ///
+    /// # Errors
+    /// As [`Self::load`].
+    pub fn load_with_file(name_or_path: &str) -> std::result::Result<(Self, HandFile), SceneError> {
+        let whole = Place::whole(name_or_path);
+        let document = Document::open(Kind::Hand, name_or_path, Path::new(""));
+        Self::from_document(document.map_err(|error| error.at(&whole))?)
+    }
+
+    /// Reads a hand from a text. `source` is its name in errors.
+    ///
+    /// # Errors
+    /// As [`Self::load`].
+    pub fn parse(text: &str, source: &str) -> std::result::Result<Self, SceneError> {
+        Self::from_document(Document::parse(text, source, Path::new(""))?).map(|(model, _)| model)
+    }
+
+    /// The files on the disk that a hand is read from: its own, and its URDF. As far as they can be told; none for a hand
+    /// built in.
+    pub fn files(name_or_path: &str) -> Vec<PathBuf> {
+        if !is_path(name_or_path) {
+            return Vec::new();
+        }
+        let document = Document::open(Kind::Hand, name_or_path, Path::new(""));
+        let urdf = document.ok().and_then(|document| document.urdf_path());
+        std::iter::once(name_or_path.into()).chain(urdf).collect()
+    }
+
+    /// Of a hand's file, with all that it says.
+    pub(super) fn from_document(document: Document) -> std::result::Result<(Self, HandFile), SceneError> {
+        let (file, mut model, notices) = checked(document, Self::build)?;
+        model.warnings.splice(0..0, notices.iter().map(Notice::to_string));
+        Ok((model, file))
+    }
+
+    /// The hand of a scene, with the configuration of its own file.
+    ///
+    /// # Errors
+    /// As [`Self::load`].
+    pub fn of(scene: &Scene) -> std::result::Result<Self, SceneError> {
+        let place = Place::whole(&format!("scene {}, hand {}", scene.name, scene.file.hand.name));
+        Self::build(&scene.file.hand).map_err(|error| error.at(&place))
+    }
+
+    /// CRC-32 of all that a firmware takes from the hand: equal hands have equal firmware.
+    pub fn hash(&self) -> u32 {
+        model::hash(&self.bytes())
+    }
+
+    /// What a firmware is built with: the hand, its configuration and the scales of its outputs, as [`model`] writes them. The same hand gives the same
+    /// bytes, wherever its file lies.
+    ///
+    /// # Panics
+    /// Never: the largest hand fits.
+    pub fn bytes(&self) -> Vec<u8> {
+        let mut buffer = [0; MODEL_BYTES];
+        let (hand, outputs) = (self.hand.cast(), &self.torques_per_volt_nm_v);
+        model::encode(&hand, &self.config, outputs, &mut buffer).expect("the largest hand fits").to_vec()
+    }
+
+    pub(crate) fn build(file: &HandFile) -> Result<Self> {
+        let mut warnings = Vec::new();
+        let hand = file.prepare(&mut warnings)?;
+        let Some(gains) = &file.control else {
+            return fail(
+                "control",
+                "the hand says nothing of its gains, which its firmware needs",
+                "add a table [control] with the keys that a scene's has: force_n, attitude_stiffness_nm, ...",
+            );
+        };
+        let setup = Setup {
+            joints: &file.joints,
+            control: gains,
+            safety: &file.safety,
+            sensors: &Sensors::default(),
+            actuators: &Actuators::default(),
+            gravity_m_s2: PlantSettings::default().gravity_m_s2,
+        };
+        let mut config = setup.config();
+        config.faults.heartbeat_ms = Some(file.safety.heartbeat_ms);
+        config.faults.late_ticks = Some(file.safety.late_ticks);
+        // What is in range in f64 may not be in f32.
+        if let Err(error) = Params::new(hand.cast::<f32>(), &config) {
+            return fail("control", format!("the controller refuses it: {error}"), "");
+        }
+        let joint_names = file.joints.iter().map(|joint| joint.name.clone()).collect();
+        let per_volt = |joint: &JointFile| joint.torque_per_volt_nm_v as f32;
+        let torques_per_volt_nm_v = file.joints.iter().map(per_volt).collect();
+        Ok(Self { name: file.name.clone(), hand, joint_names, config, torques_per_volt_nm_v, warnings })
+    }
+}
+
+impl HandFile {
+    /// Loads a hand by its built-in name or by its path, checks it, and prepares its kinematics; with what is odd in it, in
+    /// words. Unlike a [`HandModel`], it may do without `[control]`.
+    ///
+    /// # Errors
+    /// One line: where, which key, what is wrong, what to do.
+    pub fn load_checked(name_or_path: &str) -> std::result::Result<(Self, Hand, Vec<String>), SceneError> {
+        let document = Document::open(Kind::Hand, name_or_path, Path::new(""));
+        let document = document.map_err(|error| error.at(&Place::whole(name_or_path)))?;
+        let mut warnings = Vec::new();
+        let (file, hand, notices) = checked(document, |file| file.prepare(&mut warnings))?;
+        warnings.splice(0..0, notices.iter().map(Notice::to_string));
+        Ok((file, hand, warnings))
+    }
+
+    /// Checks all that every hand needs, and prepares it. A firmware needs the table `[control]` as well.
+    pub(crate) fn prepare(&self, warnings: &mut Vec<String>) -> Result<Hand> {
+        schema("schema", self.schema)?;
+        name("name", &self.name)?;
+        self.control.as_ref().map_or(Ok(()), control)?;
+        hand(self, warnings).map_err(as_of_hand)
+    }
+
+    /// The kinematics and masses, whatever size the numbers have: for those who look into what is wrong with a hand.
+    pub(crate) fn kinematics(&self) -> Result<Hand> {
+        kinematics(self).map_err(as_of_hand)
+    }
+}
+
+/// Reads a hand and checks it; what is wrong gets its place.
+fn checked<T>(
+    document: Document,
+    check: impl FnOnce(&HandFile) -> Result<T>,
+) -> Result<(HandFile, T, Vec<Notice>)> {
+    let (file, places) = HandFile::from_document(document)?;
+    let found = check(&file).map_err(|error| {
+        let place = places.of(&error.key);
+        error.at(&place)
+    })?;
+    Ok((file, found, places.notices))
+}
+
+/// The checks know the keys of a scene.
+fn as_of_hand(mut error: SceneError) -> SceneError {
+    if let Some(key) = error.key.strip_prefix("hand.") {
+        error.key = key.into();
+    }
+    error
+}

@@ -1,0 +1,213 @@
+//! `hand check`: what a hand is, whether it can be used, and what is likely a mistake.
+//!
+//! `mend` and `structure` put the file before the loader until all that it refuses is known; a `specimen` is what can then be
+//! computed with. `rules` look at it: each kind of mistake is a rule. `reach`, `meeting` and `strength` compute what the
+//! rules and the `facts` need: how far fingertips get, where they meet, what the motors can do. `text` shows it to people.
+
+mod facts;
+mod found;
+mod meeting;
+mod mend;
+mod reach;
+mod rules;
+mod specimen;
+mod strength;
+mod structure;
+#[cfg(test)]
+mod tests;
+mod text;
+
+use super::finding::{Counts, Finding, Findings, Severity, Verdict};
+use crate::{HandFile, HandModel, Places, SceneError, moving_masses};
+use blindgrasp_body::{Hand, MAX_JOINTS};
+use found::Found;
+use serde::Serialize;
+use specimen::Specimen;
+
+pub use facts::{FingertipFacts, JointFacts, Masses, MeetingFacts, MeetingsFacts, Reach};
+
+/// What a check of a hand found. `--json` prints it.
+#[derive(Clone, Debug, Serialize)]
+pub struct HandCheck {
+    /// Its name.
+    pub name: String,
+    /// A sentence or two.
+    pub description: String,
+    /// What follows from the findings.
+    pub verdict: Verdict,
+    /// How many there are.
+    pub counts: Counts,
+    /// The joint map.
+    pub joints: Vec<JointFacts>,
+    /// The fingertips.
+    pub fingertips: Vec<FingertipFacts>,
+    /// How far they get; empty where the tree is not known.
+    pub reach: Vec<Reach>,
+    /// What the links weigh; `None` where the tree is not known.
+    pub masses: Option<Masses>,
+    /// Where the fingertips meet; `None` where the tree is not known.
+    pub meeting: Option<MeetingsFacts>,
+    /// All that was found, the worst first.
+    pub findings: Findings,
+    /// For a picture.
+    #[serde(skip)]
+    pub nominal: Option<NominalHand>,
+}
+
+/// A hand and the posture to show it in.
+#[derive(Clone, Debug, PartialEq)]
+pub struct NominalHand {
+    /// The hand.
+    pub hand: Hand,
+    /// Names of its joints, in its order.
+    pub joint_names: Vec<String>,
+    /// Nominal angles within the limits, rad; zero beyond the hand's joints.
+    pub angles_rad: [f64; MAX_JOINTS],
+}
+
+impl HandCheck {
+    /// Loads a hand by its built-in name or by its path, and looks at everything.
+    ///
+    /// # Errors
+    /// What keeps the file from being read at all: it is not there, no TOML, or a key is unknown, missing or of another type.
+    pub fn load(name_or_path: &str) -> Result<Self, SceneError> {
+        let (file, places) = HandFile::load_with_places(name_or_path)?;
+        Ok(Self::of(file, &places))
+    }
+
+    /// Looks at a hand that is in a text; `source` is its name in findings.
+    ///
+    /// # Errors
+    /// As [`Self::load`].
+    pub fn parse(text: &str, source: &str) -> Result<Self, SceneError> {
+        let (file, places) = HandFile::parse_with_places(text, source)?;
+        Ok(Self::of(file, &places))
+    }
+
+    fn of(file: HandFile, places: &Places) -> Self {
+        let mut found = Found::default();
+        let specimen = examine(&file, &mut found);
+        let specimen = specimen.as_ref();
+        let meetings = specimen.map(|specimen| {
+            let meetings = meeting::meetings(specimen);
+            look(specimen, &meetings, &mut found);
+            facts::meetings(specimen, &meetings)
+        });
+        confirm(&file, &mut found);
+        let mut findings = Findings::default();
+        findings.extend(found.findings.into_iter().map(|finding| {
+            let place = places.of(&finding.key);
+            finding.at(place)
+        }));
+        findings.extend(places.notices.iter().map(|notice| {
+            Finding::new(Severity::Notice, &notice.what, &notice.remedy).at(notice.place.clone())
+        }));
+        findings.sort();
+        Self {
+            joints: facts::joints(&file, specimen),
+            fingertips: facts::fingertips(&file, specimen),
+            reach: specimen.map_or(Vec::new(), facts::reaches),
+            masses: specimen.map(facts::masses),
+            meeting: meetings,
+            verdict: findings.verdict(),
+            counts: findings.counts(),
+            findings,
+            nominal: specimen.map(|specimen| NominalHand {
+                hand: specimen.hand.clone(),
+                joint_names: specimen.file.joints.iter().map(|joint| joint.name.clone()).collect(),
+                angles_rad: specimen.nominal_rad,
+            }),
+            name: file.name,
+            description: file.description,
+        }
+    }
+
+    /// All of it for people to read.
+    pub fn text(&self) -> String {
+        text::describe(self)
+    }
+}
+
+/// What is wrong with numbers by themselves, and all that the loader refuses. Gives the hand, if the tree is known.
+fn examine(file: &HandFile, found: &mut Found) -> Option<Specimen> {
+    use rules::numbers::{axes, degrees, lengths, radii, subject_of};
+    for rule in [axes, degrees, lengths, radii] {
+        rule(file, found);
+    }
+    for error in mend::refused_numbers(file) {
+        let subject = subject_of(file, &error.key);
+        found.refuse(error, subject);
+    }
+    let mut mended = file.clone();
+    let is_placed = mend::mend_kinematics(&mut mended);
+    let structure = structure::settle(&mut mended);
+    for error in structure.refused {
+        let subject = subject_of(file, &error.key);
+        found.refuse(error, subject);
+    }
+    let hand = structure.hand.filter(|_| is_placed)?;
+    Some(Specimen::new(mended, structure.numbers, hand))
+}
+
+/// All that needs the tree.
+fn look(specimen: &Specimen, meetings: &meeting::Meetings, found: &mut Found) {
+    use rules::{axes, drive, gains, inertia, ranges, shape};
+    inertia::links(specimen, found);
+    still(specimen, found);
+    for rule in [
+        ranges::zero,
+        ranges::narrow,
+        axes::senses,
+        shape::size,
+        shape::freedom,
+        shape::overlaps,
+        drive::torques,
+        drive::speeds,
+        drive::encoders,
+        gains::damping,
+        gains::control,
+    ] {
+        rule(specimen, found);
+    }
+    shape::meeting(specimen, meetings, found);
+}
+
+/// Joints that move no mass, which nothing can simulate.
+fn still(specimen: &Specimen, found: &mut Found) {
+    let mut file = specimen.file.clone();
+    let mut hand = specimen.hand.clone();
+    let angles = &specimen.nominal_rad[..specimen.joints()];
+    // Each turn gives one link a mass.
+    for _ in 0..specimen.joints() {
+        let Err(error) = moving_masses(&file, &hand, angles) else { return };
+        let number = error.key.split('.').nth(2).and_then(|number| number.parse::<usize>().ok());
+        let Some(joint) = number.and_then(|number| number.checked_sub(1)).filter(|k| *k < specimen.joints())
+        else {
+            return;
+        };
+        let remedy = "give its link, or one that it carries, a mass and an inertia";
+        let what = "moves no mass: the hand can't be simulated";
+        found.push(specimen.on_joint(super::finding::Severity::Error, (joint, "mass_kg"), what, remedy));
+        let size = specimen.typical_bone_m();
+        let mass = 1.0_f64.max(file.joints.iter().map(|joint| joint.mass_kg).sum());
+        file.joints[joint].mass_kg = mass;
+        file.joints[joint].inertia_kg_m2.0 = vec![mass * size * size; 3];
+        let Ok(heavier) = file.kinematics() else { return };
+        hand = heavier;
+    }
+}
+
+/// What no rule knows of: a hand without errors is one that a firmware can be built with, gains or not.
+fn confirm(file: &HandFile, found: &mut Found) {
+    if found.findings.iter().any(|finding| finding.severity == super::finding::Severity::Error) {
+        return;
+    }
+    let refused = match &file.control {
+        Some(_) => HandModel::build(file).map(|_| ()),
+        None => file.prepare(&mut Vec::new()).map(|_| ()),
+    };
+    if let Err(error) = refused {
+        let subject = rules::numbers::subject_of(file, &error.key);
+        found.refuse(error, subject);
+    }
+}

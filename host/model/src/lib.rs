@@ -1,0 +1,330 @@
+//! Scenes: a hand, an object and the conditions of a run, read from TOML files, checked, and prepared for the simulator.
+//!
+//! - **Built in** are the scenes, hands and objects of `models/`, under the names of their files. A name that ends in
+//!   `.toml` or contains a separator is a path instead; references in a file are relative to that file.
+//! - The **effective configuration** is what stays once references are followed, defaults filled in and `--set` applied:
+//!   [`Scene::file`], written by [`Scene::effective_toml`] and read back as the same scene.
+//! - An error is one line: where, which key, what is wrong, what to do. What is odd but can be simulated is a warning.
+//!
+//! Frames: the *base frame* of the hand is the world; the *object frame* has its origin at the object's centre of mass.
+
+mod build;
+mod check;
+mod controller;
+mod draft;
+mod equilibrium;
+mod error;
+pub mod file;
+mod hand;
+mod hand_model;
+pub mod inspect;
+pub mod inverse_kinematics;
+mod library;
+pub mod mesh;
+mod object;
+mod read;
+mod start;
+#[cfg(test)]
+mod tests;
+mod tree;
+mod urdf;
+
+use blindgrasp_body::JointFriction;
+use blindgrasp_body::polyhedron::Polyhedron;
+use blindgrasp_body::{FaceContact, FingertipModel};
+use blindgrasp_body::{Hand, MAX_JOINTS};
+use blindgrasp_shared::control::LawsConfig;
+use blindgrasp_shared::math::Real;
+use blindgrasp_shared::tick::Config;
+use controller::Setup;
+use library::{Document, Kind};
+use nalgebra::{Matrix3, UnitQuaternion, Vector3};
+use std::path::Path;
+use tree::Node;
+
+pub use draft::Draft;
+pub use equilibrium::equilibrium_indentations;
+pub(crate) use error::one_line;
+pub use error::{Notice, Place, SceneError, suggestion};
+pub use file::{
+    Actuators, Control, Friction, HandFile, ObjectFile, PlantSettings, Safety, SceneFile, Sensors,
+};
+pub(crate) use hand::moving_masses;
+pub use hand::posture;
+pub use hand_model::HandModel;
+pub use library::is_of_files;
+pub use object::ObjectBody;
+pub(crate) use object::breaks_triangle;
+pub use tree::Setting;
+pub use urdf::{FingertipRequest, Starter, StarterRequest};
+
+/// A scene, checked and ready for the simulator.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Scene {
+    /// Its name.
+    pub name: String,
+    /// A sentence or two about it.
+    pub description: String,
+    /// Length of the run, s.
+    pub duration_s: f64,
+    /// Seed of the noise.
+    pub seed: u32,
+    /// Kinematics and link masses of the hand.
+    pub hand: Hand,
+    /// One a joint, in the hand's order.
+    pub joints: Vec<JointParameters>,
+    /// One a fingertip, in the hand's order.
+    pub fingertips: Vec<FingertipModel>,
+    /// The object in its own frame.
+    pub object: Polyhedron,
+    /// Its name.
+    pub object_name: String,
+    /// Its mass, kg.
+    pub mass_kg: f64,
+    /// Its inertia about its centre of mass in the object frame, kg m^2. Not diagonal in general.
+    pub inertia_kg_m2: Matrix3<f64>,
+    /// The face that each fingertip touches, in the hand's order.
+    pub contacts: Vec<FaceContact>,
+    /// Where everything is at the start; all speeds are zero.
+    pub start: Start,
+    /// The controller.
+    pub control: Control,
+    /// The joint sensors.
+    pub sensors: Sensors,
+    /// The motors and their amplifiers.
+    pub actuators: Actuators,
+    /// The friction of the joints. Its factor is already in [`JointParameters`].
+    pub friction: Friction,
+    /// The simulated world.
+    pub plant: PlantSettings,
+    /// How many steps of the integrator make one control period.
+    pub substeps: usize,
+    /// What is odd but can be simulated, in words.
+    pub warnings: Vec<String>,
+    /// The effective configuration.
+    pub file: SceneFile,
+}
+
+/// What is known of a scene before hand and object meet, checked and prepared.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Parts {
+    /// Kinematics and link masses of the hand.
+    pub hand: Hand,
+    /// The object.
+    pub object: ObjectBody,
+    /// How many steps of the integrator make one control period.
+    pub substeps: usize,
+    /// What is odd but can be simulated, in words.
+    pub warnings: Vec<String>,
+}
+
+impl Parts {
+    /// Of a configuration whose pose and contacts are still to be found.
+    ///
+    /// # Errors
+    /// One line: which key, what is wrong, what to do.
+    pub fn of(file: &SceneFile) -> Result<Self, SceneError> {
+        build::parts(file)
+    }
+}
+
+/// What the simulator needs to know of a joint besides the [`Hand`]. Torque limit and friction are those that the
+/// scene asks for: switched off, they are infinite and zero.
+#[derive(Clone, Debug, PartialEq)]
+pub struct JointParameters {
+    /// Its name.
+    pub name: String,
+    /// Gain `C` of Eq. 30, with the scene's factor, N m s/rad.
+    pub damping_gain_nm_s_rad: f64,
+    /// The largest torque of the motor at the joint, N m; infinite where the scene switches the limits off.
+    pub torque_limit_nm: f64,
+    /// The largest speed of the motor at the joint, rad/s.
+    pub speed_limit_rad_s: f64,
+    /// Encoder counts in one turn of the joint.
+    pub encoder_counts_per_turn: f64,
+    /// Whether the count falls while the joint turns in its positive direction.
+    pub encoder_reversed: bool,
+    /// The count at joint angle zero.
+    pub encoder_zero_count: i32,
+    /// Friction, with the scene's factor.
+    pub friction: JointFriction,
+}
+
+/// Where everything is at the start.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Start {
+    /// Joint angles, rad.
+    pub angles_rad: Vec<f64>,
+    /// Centre of mass of the object in the base frame, m.
+    pub position_m: Vector3<f64>,
+    /// Attitude `R` of the object.
+    pub attitude: UnitQuaternion<f64>,
+    /// Indentation `dr_i` of each fingertip, m.
+    pub indentations_m: Vec<f64>,
+    /// Contact point of each fingertip in the object frame, m.
+    pub points_m: Vec<Vector3<f64>>,
+}
+
+impl Scene {
+    /// Loads a scene by its built-in name or by its path, which ends in `.toml` or contains a separator, with settings
+    /// `KEY=VALUE`: keys of the effective configuration such as `control.force_n` or `hand.joint.3.mass_kg`. Items of a
+    /// list go by their number from 1, by the `name` they have, or `*` for all.
+    ///
+    /// # Errors
+    /// One line: where, which key, what is wrong, what to do.
+    pub fn load(name_or_path: &str, settings: &[String]) -> Result<Self, SceneError> {
+        let document = Document::open(Kind::Scene, name_or_path, Path::new(""))
+            .map_err(|error| error.at(&Place::whole(name_or_path)))?;
+        Self::from_document(document, settings)
+    }
+
+    /// Reads a scene from a text. `source` is its name in errors; references are relative to `folder`.
+    ///
+    /// # Errors
+    /// One line: where, which key, what is wrong, what to do.
+    pub fn parse(text: &str, source: &str, folder: &Path, settings: &[String]) -> Result<Self, SceneError> {
+        Self::from_document(Document::parse(text, source, folder)?, settings)
+    }
+
+    fn from_document(document: Document, settings: &[String]) -> Result<Self, SceneError> {
+        let settings = settings.iter().map(|text| Setting::parse(text)).collect::<Result<Vec<_>, _>>()?;
+        Draft::of(document, &settings)?.scene(&settings)
+    }
+
+    /// Checks and prepares a scene that was put together in code.
+    ///
+    /// # Errors
+    /// One line: which key, what is wrong, what to do.
+    pub fn build(file: SceneFile) -> Result<Self, SceneError> {
+        build::scene(file)
+    }
+
+    /// The effective configuration, hand and object included. Reading it gives this scene again.
+    pub fn effective_toml(&self) -> String {
+        // Only what TOML can't express fails, and none of the structs contains such a thing.
+        toml::to_string(&self.file).unwrap_or_default()
+    }
+
+    /// The configuration of the controller; zero beyond the hand's joints.
+    pub fn controller_config(&self) -> Config<MAX_JOINTS> {
+        self.setup().config()
+    }
+
+    /// The control laws and their gains, in either precision.
+    pub fn laws_config<T: Real>(&self) -> LawsConfig<T, MAX_JOINTS> {
+        self.setup().laws()
+    }
+
+    fn setup(&self) -> Setup<'_> {
+        Setup {
+            joints: &self.file.hand.joints,
+            control: &self.control,
+            safety: &self.file.hand.safety,
+            sensors: &self.sensors,
+            actuators: &self.actuators,
+            gravity_m_s2: self.plant.gravity_m_s2,
+        }
+    }
+
+    /// Names of the built-in scenes.
+    pub fn built_in() -> impl Iterator<Item = &'static str> {
+        Kind::Scene.built_in().iter().map(|(name, _)| *name)
+    }
+}
+
+impl HandFile {
+    /// Names of the built-in hands.
+    pub fn built_in() -> impl Iterator<Item = &'static str> {
+        Kind::Hand.built_in().iter().map(|(name, _)| *name)
+    }
+
+    /// Loads a hand by its built-in name or by its path.
+    ///
+    /// # Errors
+    /// What is wrong with the file as a file; a [`Scene`] checks the numbers.
+    pub fn load(name_or_path: &str) -> Result<Self, SceneError> {
+        Self::load_with_places(name_or_path).map(|(file, _)| file)
+    }
+
+    /// The same, with where its values come from.
+    pub(crate) fn load_with_places(name_or_path: &str) -> Result<(Self, Places), SceneError> {
+        Self::from_document(open(Kind::Hand, name_or_path)?)
+    }
+
+    /// Reads a hand from a text; `source` is its name in places.
+    pub(crate) fn parse_with_places(text: &str, source: &str) -> Result<(Self, Places), SceneError> {
+        Self::from_document(Document::parse(text, source, Path::new(""))?)
+    }
+
+    fn from_document(document: Document) -> Result<(Self, Places), SceneError> {
+        let mut notices = Vec::new();
+        let tree = document.complete_hand(&mut notices)?;
+        Ok((read::read(&tree, "")?, Places { tree, notices }))
+    }
+}
+
+/// Where the values of a file come from, and what was odd on the way.
+#[derive(Clone, Debug)]
+pub(crate) struct Places {
+    tree: Node,
+    /// What is odd in the file, or in what it names.
+    pub(crate) notices: Vec<Notice>,
+}
+
+impl Places {
+    /// The place of a key, or that of the nearest thing around it.
+    pub(crate) fn of(&self, key: &str) -> Place {
+        self.tree.place_of(key).clone()
+    }
+}
+
+impl ObjectFile {
+    /// Loads an object by its built-in name or by its path.
+    ///
+    /// # Errors
+    /// What is wrong with the file as a file; a [`Scene`] checks the numbers.
+    pub fn load(name_or_path: &str) -> Result<Self, SceneError> {
+        Self::load_with_notices(name_or_path).map(|(file, _)| file)
+    }
+
+    /// Reads an object from a text. `source` is its name in errors; its mesh is relative to `folder`.
+    ///
+    /// # Errors
+    /// As [`Self::load`].
+    pub fn parse(text: &str, source: &str, folder: &Path) -> Result<Self, SceneError> {
+        read::read(&Document::parse(text, source, folder)?.complete_object(&mut Vec::new())?, "")
+    }
+
+    /// As [`Self::load`], with what its mesh was repaired of.
+    ///
+    /// # Errors
+    /// As [`Self::load`].
+    pub fn load_with_notices(name_or_path: &str) -> Result<(Self, Vec<Notice>), SceneError> {
+        Self::load_with_places(name_or_path).map(|(file, places)| (file, places.notices))
+    }
+
+    /// Loads an object and checks its numbers; with what is odd in it, in words.
+    ///
+    /// # Errors
+    /// One line: where, which key, what is wrong, what to do.
+    pub fn load_checked(name_or_path: &str) -> Result<(Self, Vec<String>), SceneError> {
+        let (file, places) = Self::load_with_places(name_or_path)?;
+        let mut warnings: Vec<String> = places.notices.iter().map(Notice::to_string).collect();
+        file.body(&mut warnings).map_err(|error| {
+            let place = places.of(&error.key);
+            error.at(&place)
+        })?;
+        Ok((file, warnings))
+    }
+
+    /// The same, with where its values come from.
+    pub(crate) fn load_with_places(name_or_path: &str) -> Result<(Self, Places), SceneError> {
+        let mut notices = Vec::new();
+        let tree = open(Kind::Object, name_or_path)?.complete_object(&mut notices)?;
+        Ok((read::read(&tree, "")?, Places { tree, notices }))
+    }
+}
+
+fn open(kind: Kind, name_or_path: &str) -> Result<Document, SceneError> {
+    Document::open(kind, name_or_path, Path::new("")).map_err(|error| error.at(&Place::whole(name_or_path)))
+}

@@ -1,0 +1,197 @@
+//! Bodies from mesh files: `[shape.mesh]` of an object with `file`, `unit` and `scale` becomes one with vertices and
+//! triangles in metres, so that everything behind it, also a recording or a scene that was written, needs no file.
+//!
+//! ```text
+//! file (.stl, .obj) -> triangles, each for itself -> metres -> vertices welded -> repaired -> vertices, triangles -> faces
+//! ```
+//!
+//! The last step is [`Polyhedron::mesh`](blindgrasp_body::polyhedron::Polyhedron::mesh); it is the same for triangles that
+//! stand in the file of an object. What is repaired, and what is not:
+//!
+//! | what | how |
+//! |---|---|
+//! | vertices within 1e-6 of the body's diagonal of another | welded; a notice, if they were not the same to the bit |
+//! | triangles without area, or there twice | left out; a notice |
+//! | triangles turned against their neighbours, or a body inside out | turned over; a notice |
+//! | cracks: open edges whose vertices are within 1e-4 of the diagonal | welded; a notice |
+//! | open edges with a neighbour's vertex in their middle | cut there; a notice |
+//! | slivers | kept: they take the face beside them |
+//! | other open edges; edges of three triangles; several parts; one-sided surfaces; no volume | refused, with the place |
+//! | a surface that cuts through itself | read; `object check` finds it |
+//!
+//! Tolerances are lengths in comparison with the diagonal of the box around the body; nothing else hangs on exact
+//! arithmetic: that a surface is closed and which way it is turned follows from the numbers of its vertices alone. Everything
+//! is bounded before room is made for it (`limits`), and takes `n log n` steps.
+
+mod cracks;
+mod limits;
+mod obj;
+mod polygon;
+mod repair;
+mod soup;
+mod stl;
+#[cfg(test)]
+mod tests;
+mod unit;
+mod weld;
+
+use super::check::{Result, within};
+use super::error::{Notice, Place, SceneError, suggestion};
+use super::file::ShapeFile;
+use super::library::Home;
+use super::tree::{Entry, Node, Value};
+use repair::{Repaired, repair};
+use soup::{Problem, Soup};
+use std::path::{Path, PathBuf};
+
+pub use unit::Unit;
+
+/// What a mesh file may be scaled by.
+const SCALES: [f64; 2] = [1e-6, 1e6];
+
+/// No body has a vertex farther than this from the origin, m.
+const FARTHEST_M: f64 = 1e6;
+
+/// What is quoted of a file in an error, characters.
+const LONGEST_EXCERPT: usize = 60;
+
+/// What to do about what was repaired.
+const REPAIRED: &str = "it is used as repaired";
+
+/// Puts vertices and triangles in the place of the mesh file that an object names, if it does; notices say what was repaired.
+pub(super) fn expand(object: &mut Node, home: &Home, notices: &mut Vec<Notice>) -> Result<()> {
+    let Some(mesh) = object.get_mut("shape").and_then(|shape| shape.get_mut("mesh")) else {
+        return Ok(());
+    };
+    let Some(entry) = take(mesh, "file") else { return Ok(()) };
+    let place = entry.place;
+    let key = |name: &str| format!("shape.mesh.{name}");
+    let fail = |name: &str, problem: String, remedy: String, place: &Place| {
+        Err(SceneError::new(key(name), problem, remedy).at(place))
+    };
+    let Value::String(file) = &entry.node.value else {
+        return fail("file", "is no name".into(), "write file = \"part.stl\"".into(), &place);
+    };
+    for given in ["vertices_m", "triangles"] {
+        if mesh.get_mut(given).is_some() {
+            return fail(given, "is given beside a file".into(), "leave one out".into(), &place);
+        }
+    }
+    let scale = match take(mesh, "scale") {
+        None => 1.0,
+        Some(entry) => {
+            let value = match entry.node.value {
+                Value::Float(value) => value,
+                Value::Integer(value) => value as f64,
+                _ => return fail("scale", "is no number".into(), "write scale = 1.0".into(), &entry.place),
+            };
+            within(&key("scale"), value, SCALES[0], SCALES[1]).map_err(|error| error.at(&entry.place))?;
+            value
+        }
+    };
+    let unit = take(mesh, "unit");
+    let of_file = |problem: Problem| {
+        SceneError::new(key("file"), format!("`{file}`: {}", problem.what), problem.remedy).at(&place)
+    };
+    let soup = parse(file, home, &entry.node.place).map_err(of_file)?;
+    let unit = match unit.as_ref().map(|entry| (&entry.node.value, &entry.place)) {
+        Some((Value::String(word), place)) => match Unit::of(word) {
+            Some(unit) => unit,
+            None => {
+                let remedy = suggestion(word, Unit::ALL.map(Unit::word));
+                return fail("unit", format!("`{word}` is unknown"), remedy, place);
+            }
+        },
+        Some((_, place)) => return fail("unit", "is no name".into(), "write unit = \"mm\"".into(), place),
+        None => {
+            let remedy = Unit::choices(&soup.size(), |word| format!("unit = \"{word}\""));
+            return fail("unit", "is missing".into(), remedy, &place);
+        }
+    };
+    let mesh_of = body(soup, unit, scale).map_err(of_file)?;
+    let Value::Table(entries) = &mut mesh.value else { return Ok(()) };
+    let node = |value| Node { value, place: place.clone() };
+    let list = |items: Vec<Value>| node(Value::Array(items.into_iter().map(node).collect()));
+    let vertices =
+        mesh_of.vertices.iter().map(|p| list(p.iter().map(|v| Value::Float(*v)).collect())).collect();
+    let triangles = mesh_of
+        .triangles
+        .iter()
+        .map(|corners| list(corners.iter().map(|k| Value::Integer(*k as i64)).collect()))
+        .collect();
+    for (name, items) in [("vertices_m", vertices), ("triangles", triangles)] {
+        let node = node(Value::Array(items));
+        entries.push(Entry { key: name.into(), place: place.clone(), node });
+    }
+    notices.extend(mesh_of.notices.into_iter().map(|notice| Notice {
+        place: place.clone(),
+        what: format!("`{file}`: {notice}"),
+        remedy: REPAIRED.to_owned(),
+    }));
+    Ok(())
+}
+
+/// Takes an entry out of a table.
+fn take(table: &mut Node, key: &str) -> Option<Entry> {
+    let Value::Table(entries) = &mut table.value else { return None };
+    let index = entries.iter().position(|entry| entry.key == key)?;
+    Some(entries.remove(index))
+}
+
+/// Reads a mesh file alone, for an object whose file is still to be written; and says what had to be repaired.
+///
+/// # Errors
+/// One line: which file, what is wrong, what to do.
+pub fn load(path: &str, unit: Option<Unit>) -> Result<(ShapeFile, Vec<Notice>)> {
+    let place = Place::whole(path);
+    let of_file = |problem: Problem| SceneError::new("", problem.what, problem.remedy).at(&place);
+    let soup = parse(path, &Home::Folder(PathBuf::new()), &place).map_err(of_file)?;
+    let Some(unit) = unit else {
+        let remedy = Unit::choices(&soup.size(), |word| format!("--unit {word}"));
+        return Err(of_file(Problem::new("a mesh file does not say its unit", remedy)));
+    };
+    let Repaired { vertices, triangles, notices } = body(soup, unit, 1.0).map_err(of_file)?;
+    let notice = |what| Notice { place: place.clone(), what, remedy: REPAIRED.to_owned() };
+    let shape = ShapeFile::mesh(vertices.into_iter().map(Into::into).collect(), triangles);
+    Ok((shape, notices.into_iter().map(notice).collect()))
+}
+
+/// As much of a file's text as an error quotes.
+fn excerpt(text: &str) -> String {
+    match text.char_indices().nth(LONGEST_EXCERPT) {
+        Some((end, _)) => format!("{}...", &text[..end]),
+        None => text.into(),
+    }
+}
+
+/// Whether a name is that of a mesh file.
+pub fn is_mesh(name: &str) -> bool {
+    ending(name).is_some_and(|ending| ending == "stl" || ending == "obj")
+}
+
+fn ending(name: &str) -> Option<String> {
+    Path::new(name).extension().map(|ending| ending.to_string_lossy().to_ascii_lowercase())
+}
+
+/// Reads a file by its name's ending.
+fn parse(name: &str, home: &Home, named_at: &Place) -> std::result::Result<Soup, Problem> {
+    let read = match ending(name).as_deref() {
+        Some("stl") => stl::read,
+        Some("obj") => obj::read,
+        _ => return Err(Problem::new("is neither .stl nor .obj", "export it as STL or OBJ")),
+    };
+    let bytes = home.mesh(name, named_at, limits::LARGEST_FILE);
+    read(bytes.map_err(|error| Problem::new(error.problem, error.remedy))?.into_owned())
+}
+
+/// From what the file says to a closed surface in metres.
+fn body(mut soup: Soup, unit: Unit, scale: f64) -> std::result::Result<Repaired, Problem> {
+    soup.scale(|length| unit.metres(length * scale));
+    let is_far = |corner: &nalgebra::Vector3<f64>| !(corner.amax() <= FARTHEST_M);
+    if let Some(k) = soup.triangles.iter().position(|corners| corners.iter().any(is_far)) {
+        let number = soup.numbers[k] + 1;
+        let what = format!("triangle {number} has a corner more than {FARTHEST_M:e} m from the origin");
+        return Err(Problem::new(what, "check its unit and its scale, or export it again"));
+    }
+    repair(soup).map_err(|fault| Problem::new(fault.to_string(), fault.remedy()))
+}

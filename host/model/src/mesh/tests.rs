@@ -1,0 +1,322 @@
+//! Mesh files: the same body in each format, what is shipped, what an object's file may say of them.
+
+mod damage;
+mod formats;
+mod repairs;
+
+use super::*;
+use crate::{ObjectFile, Scene, object};
+use blindgrasp_body::polyhedron::Polyhedron;
+use blindgrasp_meshes::{Mesh, bracket, icosphere, plate};
+use nalgebra::Vector3;
+
+const OBJECT: &str = "schema = 1\nname = \"part\"\ndensity_kg_m3 = 20\n[shape.mesh]\n";
+
+fn binary(mesh: &Mesh) -> Vec<u8> {
+    let mut bytes = Vec::new();
+    stl_io::write_stl(&mut bytes, facets(mesh).iter()).unwrap();
+    bytes
+}
+
+/// The triangles in millimetres. A mesh file does not need normals that are right, and these are not.
+fn facets((vertices, triangles): &Mesh) -> Vec<stl_io::Triangle> {
+    let vertex = |k: usize| stl_io::Vertex::new((vertices[k] * 1e3).map(|v| v as f32).into());
+    let normal = stl_io::Normal::new([0.0; 3]);
+    triangles.iter().map(|corners| stl_io::Triangle { normal, vertices: corners.map(vertex) }).collect()
+}
+
+fn ascii(mesh: &Mesh) -> Vec<u8> {
+    let mut text = "solid part\n".to_owned();
+    for facet in facets(mesh) {
+        text += "  facet normal 0 0 0\n    outer loop\n";
+        for vertex in facet.vertices {
+            text += &format!("      vertex {} {} {}\n", vertex.0[0], vertex.0[1], vertex.0[2]);
+        }
+        text += "    endloop\n  endfacet\n";
+    }
+    (text + "endsolid part\n").into_bytes()
+}
+
+/// With the coordinates that STL leaves of them.
+fn wavefront((vertices, triangles): &Mesh) -> Vec<u8> {
+    let mut text = "mtllib nowhere.mtl\no part\n".to_owned();
+    for vertex in vertices {
+        let [x, y, z] = (vertex * 1e3).map(|v| f64::from(v as f32)).into();
+        text += &format!("v {x} {y} {z}\n");
+    }
+    for [a, b, c] in triangles {
+        text += &format!("f {} {} {}\n", a + 1, b + 1, c + 1);
+    }
+    text.into_bytes()
+}
+
+/// What a file of this name and content becomes.
+fn read(name: &str, bytes: &[u8]) -> std::result::Result<Repaired, Problem> {
+    let soup = if name.ends_with("stl") { stl::read(bytes.to_vec()) } else { obj::read(bytes.to_vec()) };
+    body(soup?, Unit::Millimetre, 1.0)
+}
+
+/// The same, as one line.
+fn refusal(name: &str, bytes: &[u8]) -> String {
+    let Problem { what, remedy } = read(name, bytes).expect_err("has to be refused");
+    format!("{what}; {remedy}")
+}
+
+fn polyhedron(repaired: &Repaired) -> Polyhedron {
+    let vertices = repaired.vertices.iter().map(|&vertex| vertex.into()).collect();
+    object::polyhedron(&ShapeFile::mesh(vertices, repaired.triangles.clone())).unwrap()
+}
+
+/// A new folder for the files of a test.
+fn folder(name: &str) -> PathBuf {
+    let folder = std::env::temp_dir().join(format!("blindgrasp-mesh-{name}-{}", std::process::id()));
+    std::fs::create_dir_all(&folder).unwrap();
+    folder
+}
+
+/// The octahedron with edges of 50 mm, its corners on the axes.
+fn octahedron() -> Mesh {
+    use blindgrasp_shared::math::Real;
+    let reach = 0.050 / 2f64.square_root();
+    let vertices = [
+        [1.0, 0.0, 0.0],
+        [0.0, 1.0, 0.0],
+        [-1.0, 0.0, 0.0],
+        [0.0, -1.0, 0.0],
+        [0.0, 0.0, 1.0],
+        [0.0, 0.0, -1.0],
+    ];
+    let mut triangles = Vec::new();
+    for k in 0..4 {
+        triangles.extend([[k, (k + 1) % 4, 4], [(k + 1) % 4, k, 5]]);
+    }
+    (vertices.iter().map(|v| Vector3::from(*v) * reach).collect(), triangles)
+}
+
+/// The bracket that is shipped: arms of 48 mm, 20 mm thick, 40 mm wide.
+fn l_bracket() -> Mesh {
+    let (mut vertices, triangles) = bracket();
+    for vertex in &mut vertices {
+        let longer = |v: f64| if v > 0.03 { 0.048 } else { v };
+        *vertex = Vector3::new(longer(vertex.x), longer(vertex.y), vertex.z / 0.03 * 0.04);
+    }
+    (vertices, triangles)
+}
+
+/// `BLESS=1 cargo test -p blindgrasp --lib shipped_meshes` writes them.
+#[test]
+fn shipped_meshes_are_made_here() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../models/objects");
+    let head = b"# A regular octahedron with edges of 50, corners on the axes.\n";
+    let octahedron = [head.to_vec(), wavefront_exact(&octahedron())].concat();
+    for (name, bytes) in [("l-bracket.stl", binary(&l_bracket())), ("octahedron.obj", octahedron)] {
+        if std::env::var_os("BLESS").is_some() {
+            std::fs::write(folder.join(name), &bytes).unwrap();
+        }
+        assert!(std::fs::read(folder.join(name)).unwrap() == bytes, "{name} is not what the test makes");
+    }
+}
+
+fn wavefront_exact((vertices, triangles): &Mesh) -> Vec<u8> {
+    let lines = vertices.iter().map(|v| format!("v {} {} {}\n", v.x * 1e3, v.y * 1e3, v.z * 1e3));
+    let faces = triangles.iter().map(|[a, b, c]| format!("f {} {} {}\n", a + 1, b + 1, c + 1));
+    lines.chain(faces).collect::<String>().into_bytes()
+}
+
+#[test]
+fn shipped_meshes_are_what_their_files_say() {
+    let (file, notices) = ObjectFile::load_with_notices("octahedron").unwrap();
+    assert_eq!(notices, []);
+    let body = object::polyhedron(&file.shape).unwrap();
+    assert_eq!((body.vertices_m.len(), body.faces.len()), (6, 8));
+    // a^3 sqrt(2) / 3.
+    let volume = 0.05f64.powi(3) * std::f64::consts::SQRT_2 / 3.0;
+    assert!((body.mass_properties().volume_m3 / volume - 1.0).abs() < 1e-14);
+
+    let (file, notices) = ObjectFile::load_with_notices("l-bracket").unwrap();
+    assert_eq!(notices, []);
+    let body = object::polyhedron(&file.shape).unwrap();
+    assert_eq!((body.vertices_m.len(), body.faces.len()), (12, 8));
+    let volume = (48.0 * 20.0 + 28.0 * 20.0) * 40.0 * 1e-9;
+    assert!((body.mass_properties().volume_m3 / volume - 1.0).abs() < 1e-14);
+}
+
+/// A mesh in a scene: relative to the object's file, and nothing of it is needed once it is read.
+#[test]
+fn a_scene_with_a_mesh_needs_no_file() {
+    let folder = folder("scene");
+    std::fs::create_dir_all(folder.join("parts")).unwrap();
+    let (vertices, triangles) = blindgrasp_meshes::grid_box([0.048; 3], 3);
+    std::fs::write(folder.join("parts/Block.STL"), binary(&(vertices, triangles))).unwrap();
+    std::fs::write(
+        folder.join("parts/block.toml"),
+        OBJECT.to_owned() + "file = \"Block.STL\"\nunit = \"mm\"\n",
+    )
+    .unwrap();
+    let cube =
+        std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("../models/scenes/cube.toml"))
+            .unwrap();
+    let by_reference = cube.replace("object = \"cube\"", "object = \"parts/block.toml\"");
+    let path = folder.join("scene.toml");
+    std::fs::write(&path, by_reference).unwrap();
+    let scene = Scene::load(path.to_str().unwrap(), &[]).unwrap();
+    assert_eq!(scene.object.faces.len(), 6);
+    assert!((scene.mass_kg / (20.0 * 0.048f64.powi(3)) - 1.0).abs() < 1e-6);
+    let text = scene.effective_toml();
+    assert!(!text.contains("Block") && text.contains("vertices_m"));
+    let again = Scene::parse(&text, "effective.toml", Path::new("/nowhere"), &[]).unwrap();
+    assert_eq!(again, scene, "bit for bit");
+    // Settings reach the mesh before it is read, and what stays of it after.
+    let set = |settings: &[&str]| {
+        let settings: Vec<String> = settings.iter().map(|s| s.to_string()).collect();
+        Scene::load(path.to_str().unwrap(), &settings)
+    };
+    let half =
+        ["object.shape.mesh.scale=0.5", "object.shape.mesh.flat_deg=1", "contact.*.point_m=[0, -0.012, 0]"];
+    let smaller = set(&half).unwrap();
+    assert!((smaller.mass_kg / scene.mass_kg - 0.125).abs() < 1e-6);
+    assert!(smaller.effective_toml().contains("flat_deg = 1.0"));
+    let stl = folder.join("parts/Block.STL");
+    let inline = cube.replace("object = \"cube\"", "")
+        + "[object]\nschema = 1\nname = \"b\"\nmass_kg = 0.002\n[object.shape.mesh]\nfile = \"parts/Block.STL\"\nunit = \"mm\"\n";
+    let scene =
+        Scene::parse(&inline, "s.toml", &folder, &[format!("object.shape.mesh.file={}", stl.display())])
+            .unwrap();
+    assert_eq!(scene.object, again.object);
+    assert_eq!(Scene::parse(&inline, "s.toml", &folder, &[]).unwrap(), scene);
+    std::fs::remove_dir_all(&folder).unwrap();
+}
+
+#[test]
+fn what_an_object_says_of_its_mesh_is_checked() {
+    let folder = folder("keys");
+    std::fs::write(folder.join("part.stl"), binary(&bracket())).unwrap();
+    std::fs::write(folder.join("part.step"), b"ISO-10303-21;").unwrap();
+    let path = folder.join("part.toml");
+    let message = |lines: &str| {
+        std::fs::write(&path, OBJECT.to_owned() + lines).unwrap();
+        let error = ObjectFile::load(path.to_str().unwrap()).expect_err("has to be refused").to_string();
+        error.strip_prefix(&format!("{}:", path.display())).expect("the place").to_owned()
+    };
+    for (lines, expected) in [
+        (
+            "file = \"part.stl\"",
+            "5: shape.mesh.unit: is missing; add unit = \"mm\" if it measures 60 x 40 x 30 mm, unit = \"cm\" if it measures \
+             600 x 400 x 300 mm, unit = \"m\" if it measures 60000 x 40000 x 30000 mm, unit = \"in\" if it measures 1524 x 1016 \
+             x 762 mm",
+        ),
+        ("file = \"part.stl\"\nunit = \"inch\"", "6: shape.mesh.unit: `inch` is unknown; did you mean `in`?"),
+        ("file = \"part.stl\"\nunit = 1", "6: shape.mesh.unit: is no name; write unit = \"mm\""),
+        ("file = 3\nunit = \"mm\"", "5: shape.mesh.file: is no name; write file = \"part.stl\""),
+        (
+            "file = \"part.stl\"\nunit = \"mm\"\nscale = 0",
+            "7: shape.mesh.scale: 0.0 is out of range; has to be between 1e-6 and 1000000.0",
+        ),
+        (
+            "file = \"part.stl\"\nunit = \"mm\"\nscale = \"1\"",
+            "7: shape.mesh.scale: is no number; write scale = 1.0",
+        ),
+        (
+            "file = \"part.stl\"\nunit = \"mm\"\ntriangles = []",
+            "5: shape.mesh.triangles: is given beside a file; leave one out",
+        ),
+        (
+            "file = \"part.stl\"\nunit = \"mm\"\nflat = 1",
+            "7: shape.mesh.flat: unknown key; did you mean `flat_m`?",
+        ),
+        ("file = \"prt.stl\"\nunit = \"mm\"", "5: shape.mesh.file: `prt.stl`: no such file; check the path"),
+        (
+            "file = \".\"\nunit = \"mm\"",
+            "5: shape.mesh.file: `.`: is neither .stl nor .obj; export it as STL or OBJ",
+        ),
+        (
+            "file = \"part.step\"\nunit = \"mm\"",
+            "5: shape.mesh.file: `part.step`: is neither .stl nor .obj; export it as STL or OBJ",
+        ),
+        ("unit = \"mm\"", "5: shape.mesh.unit: unknown key; known: vertices_m, triangles, flat_deg, flat_m"),
+        ("vertices_m = []", "4: shape.mesh.triangles: is missing; add `triangles = ...`"),
+        (
+            "vertices_m = []\ntriangles = [[0, 1]]",
+            "6: shape.mesh.triangles.1: has 2 items; has to be a list of 3",
+        ),
+        (
+            "vertices_m = []\ntriangles = [[0, 1, -2]]",
+            "6: shape.mesh.triangles.1.3: is integer `-2`; has to be a whole number, not negative",
+        ),
+    ] {
+        assert_eq!(message(lines), expected, "{lines}");
+    }
+    std::fs::remove_dir_all(&folder).unwrap();
+}
+
+#[test]
+fn numbers_of_a_mesh_are_checked() {
+    let scene = |mesh: &str| {
+        let cube =
+            std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("../models/scenes/cube.toml"))
+                .unwrap();
+        let object = "[object]\nschema = 1\nname = \"b\"\nmass_kg = 0.002\n[object.shape.mesh]\n";
+        let text = cube.replace("object = \"cube\"", "") + object + mesh;
+        Scene::parse(&text, "s.toml", Path::new(""), &[]).expect_err("has to be refused").to_string()
+    };
+    let tetrahedron = "vertices_m = [[0, 0, 0], [0.03, 0, 0], [0, 0.03, 0], [0, 0, 0.03]]\n";
+    assert_eq!(
+        scene(&format!("{tetrahedron}triangles = [[0, 2, 1], [0, 1, 3], [0, 3, 2]]\n")),
+        "s.toml:54: object.shape.mesh: it is not closed: 3 open edges, the first at triangle 1 from (0, 30, 0) to (30, 0, 0) mm; \
+         close the surface in the program that it comes from, and export a solid"
+    );
+    assert_eq!(
+        scene(&format!(
+            "{tetrahedron}triangles = [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]]\nflat_deg = 50\n"
+        )),
+        "s.toml:57: object.shape.mesh.flat_deg: 50.0 is out of range; has to be between 0.0 and 45.0"
+    );
+}
+
+#[test]
+fn units_and_scales_give_metres() {
+    for (unit, metres) in
+        [(Unit::Metre, 57.0), (Unit::Centimetre, 0.57), (Unit::Millimetre, 0.057), (Unit::Inch, 1.4478)]
+    {
+        assert_eq!(unit.metres(57.0), metres);
+        assert_eq!(Unit::of(unit.word()), Some(unit));
+    }
+    let folder = folder("units");
+    let path = folder.join("part.stl");
+    std::fs::write(&path, binary(&bracket())).unwrap();
+    let size = |unit| match load(path.to_str().unwrap(), Some(unit)).unwrap().0 {
+        ShapeFile::Mesh { vertices_m, .. } => vertices_m.iter().map(|v| v[0]).fold(0.0, f64::max),
+        _ => 0.0,
+    };
+    assert_eq!((size(Unit::Millimetre), size(Unit::Centimetre)), (0.06, 0.6));
+    let error = load(path.to_str().unwrap(), None).unwrap_err();
+    assert_eq!(
+        error.to_string(),
+        format!(
+            "{}: a mesh file does not say its unit; add --unit mm if it measures 60 x 40 x 30 mm, --unit cm if it measures 600 x \
+             400 x 300 mm, --unit m if it measures 60000 x 40000 x 30000 mm, --unit in if it measures 1524 x 1016 x 762 mm",
+            path.display()
+        )
+    );
+    std::fs::remove_dir_all(&folder).unwrap();
+}
+
+/// On an inner side of the L, the wall beside it is near.
+#[test]
+fn a_fingertip_that_would_cut_into_a_wall_is_refused() {
+    let scene = |y_mm: f64| {
+        let x_mm = 28640.0 / 1520.0;
+        let point = format!("contact.2.point_m=[{}, {}, 0]", (20.0 - x_mm) / 1e3, (20.0 - x_mm + y_mm) / 1e3);
+        Scene::load("l-bracket", &["contact.2.face=5".to_owned(), point])
+    };
+    let message = scene(5.0).unwrap_err().to_string();
+    assert!(
+        message.ends_with(
+            "contact.2: fingertip `finger-2` would reach 10.000 mm into another part of the object than face 5; move the contact \
+             point away from what rises beside the face, or choose another face"
+        ),
+        "{message}"
+    );
+    // Farther away there is room; that the finger does not get there is another matter.
+    assert!(scene(16.0).is_ok_and(|_| true) || scene(16.0).unwrap_err().to_string().contains("stays"));
+}

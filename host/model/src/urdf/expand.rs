@@ -1,0 +1,215 @@
+//! From a URDF to the entries of a hand.
+
+use super::super::check::{Result, fail, item};
+use super::super::error::{Notice, Place, SceneError, suggestion};
+use super::super::file::FingertipFile;
+use super::super::library::Home;
+use super::super::read::read;
+use super::super::tree::{Entry, Node, Value};
+use super::assembly::{Assembly, Moving, Seat};
+use super::complete::{Oddities, complete, list, text};
+use super::keys::Keys;
+use super::robot::{Joint, Kind, Robot};
+use super::topology::Tree;
+use super::xml::quote;
+
+/// The file that a hand's `[urdf]` names.
+pub(crate) fn file_of(hand: &Node) -> Option<&Node> {
+    hand.get("urdf")?.get("file")
+}
+
+/// Replaces the table `[urdf]` of a hand, if there is one, by joints and fingertips. Defaults of fingertips are spread
+/// before, those of joints after.
+///
+/// # Errors
+/// What is wrong with the URDF, in the URDF; or with the hand's file, there.
+pub(crate) fn expand(hand: &mut Node, home: &Home, notices: &mut Vec<Notice>) -> Result<()> {
+    let Some(Entry { place, node: table, .. }) = hand.take("urdf") else { return Ok(()) };
+    let keys: Keys = read(&table, "urdf")?;
+    let at_key = |error: SceneError| {
+        // Only errors about the table have none yet.
+        let place = table.place_of(error.key.strip_prefix("urdf.").unwrap_or_default()).clone();
+        error.at(&place)
+    };
+    keys.check().map_err(at_key)?;
+    let file_place = table.place_of("file");
+    let (text, source) =
+        home.urdf(&keys.file, file_place).map_err(|error| error.of_reference("urdf.file", file_place))?;
+    let robot = Robot::parse(&text, &source)?;
+    let tree = Tree::of(&robot)?;
+
+    let Some(list) = hand.get("fingertip") else {
+        let error = SceneError::new("fingertip", "is missing", "add a [[fingertip]], with the URDF's link");
+        return Err(error.at(&place));
+    };
+    let fingertips: Vec<FingertipFile> = read(list, "fingertip")?;
+    let mut tips = Vec::with_capacity(fingertips.len());
+    for (i, fingertip) in fingertips.iter().enumerate() {
+        match robot.link_index(&fingertip.link) {
+            Some(link) => tips.push(link),
+            None => {
+                let problem = format!("{} has no link `{}`", keys.file, quote(&fingertip.link));
+                let error = SceneError::new(
+                    item("fingertip", i, "link"),
+                    problem,
+                    robot.link_suggestion(&fingertip.link),
+                );
+                return Err(error.at(hand.place_of(&item("fingertip", i, "link"))));
+            }
+        }
+    }
+    let assembly = Assembly::new(&robot, &tree, &keys, &tips, notices).map_err(at_key)?;
+    let hand_parts = Parts { robot: &robot, assembly: &assembly, keys: &keys, place: &place };
+    hand_parts.seat_fingertips(hand, &fingertips, &tips)?;
+    hand_parts.add_joints(hand, notices)
+}
+
+/// What the entries are made of.
+pub(super) struct Parts<'a> {
+    pub(super) robot: &'a Robot,
+    pub(super) assembly: &'a Assembly,
+    pub(super) keys: &'a Keys,
+    /// Of the table `[urdf]`.
+    pub(super) place: &'a Place,
+}
+
+impl Parts<'_> {
+    /// The joint as the URDF has it.
+    pub(super) fn joint(&self, moving: &Moving) -> &Joint {
+        &self.robot.joints[moving.joint]
+    }
+
+    /// Name of one of the hand's joints.
+    pub(super) fn name(&self, index: usize) -> &str {
+        &self.joint(&self.assembly.joints[index]).name
+    }
+
+    /// Fingertips move from their links to the joints that carry them.
+    fn seat_fingertips(&self, hand: &mut Node, fingertips: &[FingertipFile], tips: &[usize]) -> Result<()> {
+        for (i, (fingertip, &link)) in fingertips.iter().zip(tips).enumerate() {
+            let key = item("fingertip", i, "link");
+            let seat = self.assembly.seats[link];
+            let Some(Seat { joint: Some(joint), frame }) = seat else {
+                let problem = match seat {
+                    Some(_) => format!("no joint moves link `{}`", quote(&fingertip.link)),
+                    None => format!("link `{}` is not below the base", quote(&fingertip.link)),
+                };
+                let remedy = "choose a link of a finger, or another base, or hold less still ([urdf])";
+                return Err(SceneError::new(&key, problem, remedy).at(hand.place_of(&key)));
+            };
+            let Some(node) = hand.get_mut("fingertip").and_then(|list| list.item_mut(i)) else { continue };
+            if let Some(link) = node.get_mut("link") {
+                link.value = Value::String(self.name(joint).into());
+            }
+            if let (Some(frame), Some(offset)) = (frame, node.get_mut("offset_m")) {
+                let place = offset.place.clone();
+                *offset = list(&frame.point(&fingertip.offset_m.into()).into(), &place);
+            }
+        }
+        Ok(())
+    }
+
+    /// The array `joint`: in its own order if it is there, else in the tree's.
+    fn add_joints(&self, hand: &mut Node, notices: &mut Vec<Notice>) -> Result<()> {
+        let count = self.assembly.joints.len();
+        let entries = match hand.take("joint") {
+            None => self.in_tree_order(),
+            Some(Entry { node: Node { value: Value::Array(items), .. }, .. }) => self.in_own_order(items)?,
+            Some(entry) => {
+                let error = SceneError::new("joint", "is no list", "write each joint as a [[joint]]");
+                return Err(error.at(&entry.place));
+            }
+        };
+        let mut items = Vec::with_capacity(count);
+        let mut oddities = Oddities::default();
+        for (k, (index, mut node)) in entries.into_iter().enumerate() {
+            let is_default =
+                |key: &str| hand.get("joint_defaults").is_some_and(|table| table.get(key).is_some());
+            complete(self, &mut node, index, &item("joint", k, "parent"), &is_default, &mut oddities)?;
+            items.push(node);
+        }
+        notices.extend(oddities.notices());
+        let array = Node { value: Value::Array(items), place: self.place.clone() };
+        hand.insert("joint", array);
+        Ok(())
+    }
+
+    fn in_tree_order(&self) -> Vec<(usize, Node)> {
+        let entry = |index: usize| {
+            let mut node = Node { value: Value::Table(Vec::new()), place: self.place.clone() };
+            let joint = self.joint(&self.assembly.joints[index]);
+            node.insert("name", text(&joint.name, &joint.place));
+            (index, node)
+        };
+        (0..self.assembly.joints.len()).map(entry).collect()
+    }
+
+    /// The entries of the file, each with the index of its joint. Parents come first, and none is left out.
+    fn in_own_order(&self, items: Vec<Node>) -> Result<Vec<(usize, Node)>> {
+        let mut entries: Vec<(usize, Node)> = Vec::with_capacity(items.len());
+        for (k, node) in items.into_iter().enumerate() {
+            let key = item("joint", k, "name");
+            let Some(name) = node.get("name") else {
+                let error =
+                    SceneError::new(key, "is missing", "add the name of the URDF's joint: `name = ...`");
+                return Err(error.at(&node.place));
+            };
+            let Value::String(word) = &name.value else {
+                let error = SceneError::new(key, "is no string", "has to be the name of a joint of the URDF");
+                return Err(error.at(&name.place));
+            };
+            let index = self.find(word, &key).map_err(|error| error.at(&name.place))?;
+            if entries.iter().any(|(other, _)| *other == index) {
+                let error =
+                    SceneError::new(key, format!("`{}` is there twice", quote(word)), "leave one out");
+                return Err(error.at(&name.place));
+            }
+            if let Some(parent) = self.assembly.joints[index].parent
+                && entries.iter().all(|(other, _)| *other != parent)
+            {
+                let parent = quote(self.name(parent));
+                let problem = format!("joint `{parent}`, which carries it, does not come before it");
+                let remedy = format!("move the [[joint]] `{parent}` up, or add it");
+                return Err(SceneError::new(key, problem, remedy).at(&name.place));
+            }
+            entries.push((index, node));
+        }
+        let is_listed = |index: usize| entries.iter().any(|(other, _)| *other == index);
+        match (0..self.assembly.joints.len()).find(|&index| !is_listed(index)) {
+            None => Ok(entries),
+            Some(index) => {
+                let name = self.name(index);
+                let problem =
+                    format!("joint `{}` of the URDF moves a fingertip and has no [[joint]]", quote(name));
+                let remedy = format!(
+                    "add it, or hold it still with `locked_rad = {{ {} = 0.0 }}`",
+                    super::assembly::toml_key(&quote(name))
+                );
+                Err(SceneError::new("", problem, remedy).at(self.place))
+            }
+        }
+    }
+
+    /// Index of a joint of the hand by its name.
+    fn find(&self, name: &str, key: &str) -> Result<usize> {
+        let moving = &self.assembly.joints;
+        if let Some(index) = moving.iter().position(|moving| self.joint(moving).name == name) {
+            return Ok(index);
+        }
+        let quoted = quote(name);
+        let Some(joint) = self.robot.joints.iter().find(|joint| joint.name == name) else {
+            let names = moving.iter().map(|moving| self.joint(moving).name.as_str());
+            return fail(key, format!("{} has no joint `{quoted}`", self.keys.file), suggestion(name, names));
+        };
+        let (problem, remedy) = if joint.kind == Kind::Fixed {
+            ("is fixed in the URDF", "leave it out: what it carries is merged with what carries it")
+        } else if self.keys.locked_rad.contains_key(name) || self.keys.locked_m.contains_key(name) {
+            ("is held still in [urdf]", "leave it out, here or there")
+        } else if self.assembly.seats[joint.child].is_none() {
+            ("is not below the base", "leave it out, or choose another `base` in [urdf]")
+        } else {
+            ("moves no fingertip", "leave it out: what it carries is merged with what carries it")
+        };
+        fail(key, format!("joint `{quoted}` {problem}"), remedy)
+    }
+}

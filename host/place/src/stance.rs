@@ -1,0 +1,124 @@
+//! A placement that is tried: whether the fingers can take it exactly, without being in each other's way or in the object's.
+
+use super::position::FACING;
+use blindgrasp_body::polyhedron::Polyhedron;
+use blindgrasp_body::{Hand, Posture};
+use blindgrasp_model::inverse_kinematics::{Unreachable, own_joints, place};
+use blindgrasp_model::posture;
+use nalgebra::{UnitQuaternion, Vector3};
+
+/// Room that a fingertip needs from parts of the object beside its face, m: more than a scene asks for.
+const CLEAR_M: f64 = 1e-6;
+
+/// Where everything is to be.
+#[derive(Clone, Debug)]
+pub(super) struct Stance {
+    /// Centre of mass of the object in the base frame, m.
+    pub(super) position_m: Vector3<f64>,
+    /// Attitude of the object.
+    pub(super) attitude: UnitQuaternion<f64>,
+    /// Face of each contact.
+    pub(super) faces: Vec<usize>,
+    /// Contact points in the object frame, m.
+    pub(super) points_m: Vec<Vector3<f64>>,
+    /// Centres of the fingertips in the object frame, m.
+    pub(super) centres_m: Vec<Vector3<f64>>,
+}
+
+/// Why fingers can't take a stance.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Miss {
+    /// A fingertip does not get there.
+    Unreachable(Unreachable),
+    /// A joint would stand at its end stop.
+    AtStop(usize),
+    /// Two fingertips overlap, by so many metres.
+    Overlap(usize, usize, f64),
+    /// A fingertip would touch with its back: the angle between its bone and the inward normal, as a cosine.
+    Back(usize, f64),
+    /// The bone that ends at a joint passes through the object.
+    Through(usize),
+    /// The last bone of a fingertip does.
+    TipThrough(usize),
+    /// A fingertip's sphere meets another part of the object, by so many metres.
+    Beside(usize, f64),
+}
+
+/// The least distance of a joint that moves one fingertip from an end stop, rad.
+pub(super) fn take(
+    hand: &Hand,
+    nominal_rad: &[f64],
+    shape: &Polyhedron,
+    stance: &Stance,
+) -> Result<f64, Miss> {
+    for (i, centre) in stance.centres_m.iter().enumerate() {
+        for (j, other) in stance.centres_m[..i].iter().enumerate() {
+            let overlap = hand.radius_m(i) + hand.radius_m(j) - (centre - other).norm();
+            if overlap > 0.0 {
+                return Err(Miss::Overlap(j, i, overlap));
+            }
+        }
+        // Of parts of the body that rise above the face; a convex body has none.
+        let missing = hand.radius_m(i) - shape.clearance_m(stance.faces[i], centre);
+        if missing > -CLEAR_M {
+            return Err(Miss::Beside(i, missing));
+        }
+    }
+    let targets: Vec<Vector3<f64>> =
+        stance.centres_m.iter().map(|centre| stance.position_m + stance.attitude * centre).collect();
+    let angles = place(hand, &targets, nominal_rad).map_err(Miss::Unreachable)?;
+    let posture = posture(hand, &angles);
+    for i in 0..targets.len() {
+        let last = posture.link(hand.fingertip_link(i)).origin_m;
+        let inward = stance.attitude * -shape.faces[stance.faces[i]].normal;
+        if let Some(bone) = (posture.centres_m[i] - last).try_normalize(1e-9)
+            && !(bone.dot(&inward) >= FACING)
+        {
+            return Err(Miss::Back(i, bone.dot(&inward)));
+        }
+    }
+    through(hand, &posture, shape, stance)?;
+    let (room_rad, joint) = room(hand, &angles);
+    if room_rad > 0.0 { Ok(room_rad) } else { Err(Miss::AtStop(joint)) }
+}
+
+/// The least distance of a joint from an end stop, rad, and which it is; of joints that move one fingertip.
+pub(super) fn room(hand: &Hand, angles_rad: &[f64]) -> (f64, usize) {
+    let own = (0..hand.fingertip_count()).flat_map(|i| own_joints(hand, i));
+    own.map(|k| {
+        let ((lower, upper), angle) = (hand.range_rad(k), angles_rad[k]);
+        (f64::min(angle - lower, upper - angle), k)
+    })
+    .min_by(|a, b| a.0.total_cmp(&b.0))
+    .unwrap_or((f64::INFINITY, 0))
+}
+
+/// Whether a bone passes through the object: the lines between the joints, from the base on.
+fn through(hand: &Hand, posture: &Posture, shape: &Polyhedron, stance: &Stance) -> Result<(), Miss> {
+    let to_object = |point: Vector3<f64>| stance.attitude.inverse() * (point - stance.position_m);
+    for k in 0..hand.joint_count() {
+        let from = hand.parent(k).map_or(Vector3::zeros(), |parent| posture.link(parent).origin_m);
+        if pierces(shape, &to_object(from), &to_object(posture.link(k).origin_m)) {
+            return Err(Miss::Through(k));
+        }
+    }
+    for i in 0..hand.fingertip_count() {
+        let from = posture.link(hand.fingertip_link(i)).origin_m;
+        if pierces(shape, &to_object(from), &to_object(posture.centres_m[i])) {
+            return Err(Miss::TipThrough(i));
+        }
+    }
+    Ok(())
+}
+
+/// Whether the line between two points, in the object frame, passes through a face.
+fn pierces(shape: &Polyhedron, from: &Vector3<f64>, to: &Vector3<f64>) -> bool {
+    shape.faces.iter().enumerate().any(|(k, face)| {
+        let (before, after) =
+            (face.normal.dot(from) - face.distance_m, face.normal.dot(to) - face.distance_m);
+        if (before > 0.0) == (after > 0.0) {
+            return false;
+        }
+        shape.margin_m(k, &(from + (to - from) * (before / (before - after)))) > 0.0
+    })
+}

@@ -1,0 +1,20 @@
+//! The simulated plant: hand, free rigid object, and soft fingertips that roll on its faces (Eqs. 1-28).
+//!
+//! [`model`] says what is simulated, [`integrator`] advances it in time. The parts: the hand's [`dynamics`](blindgrasp_body::dynamics), [`contact`] of a
+//! fingertip with a face, joint [`friction`], `rotation` of the object, and `coupling`, the linear algebra that solves for all of
+//! them together. A `push` comes from outside. A [`ledger`] is kept of the energy that flows in and out.
+
+pub mod contact;
+mod coupling;
+pub mod friction;
+pub mod integrator;
+pub mod ledger;
+mod linear;
+pub mod model;
+mod push;
+mod rotation;
+mod surroundings;
+
+pub use integrator::Plant;
+pub use ledger::Flows;
+pub use model::{ContactForce, Lost, ModelError, Motion, ObjectModel, PlantModel};

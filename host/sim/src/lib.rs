@@ -1,0 +1,344 @@
+//! The closed loop on the host: the tick that the microcontroller runs, in `f32`, against the plant, in `f64`.
+//!
+//! One control period has these stages, as on the hand:
+//!
+//! 1. **Sense**: the encoders count the joint angles of this instant (with noise, if asked for).
+//! 2. **Control**: the tick takes the counts to torques.
+//! 3. **Actuate**: the amplifiers hold, for one period, the torques of the tick before (the one-cycle output delay of a
+//!    controller that reads first and writes last; or as many ticks before as the scene says), within what the motors can do.
+//! 4. **Plant**: sub-steps up to the next period. Friction of the joints is the plant's.
+//! 5. **Record**: the state at the beginning of the period.
+//!
+//! Time 0 is the tick that is told to grasp. Before it the hand is armed while everything stands still, which starts the
+//! estimator. Everything is deterministic: the same scene and seed give the same bytes.
+
+pub mod controller;
+pub mod csv;
+pub mod delay;
+pub mod encoders;
+pub mod injection;
+pub mod motors;
+pub mod observe;
+pub mod recorder;
+pub mod run_dir;
+pub mod sample;
+pub mod summary;
+
+use crate::sample::Sample;
+use blindgrasp_body::MAX_JOINTS;
+use blindgrasp_model::Scene;
+use blindgrasp_model::file::PushFile;
+use blindgrasp_plant::{Lost, ModelError, Motion, ObjectModel, Plant, PlantModel};
+use blindgrasp_shared::command::{Command, Grasp};
+use blindgrasp_shared::control::Laws;
+use blindgrasp_shared::fault::Raised;
+use blindgrasp_shared::parameter::ParameterError;
+use blindgrasp_shared::tick::Sensed;
+use controller::{Alone, Controller, Reach, Stepped, Turn};
+use delay::Delay;
+use encoders::Encoders;
+use injection::{Injection, Injections, Sensing};
+use motors::Motors;
+use nalgebra::Vector3;
+use observe::{Observer, Seen};
+use std::num::NonZeroU64;
+use std::time::Instant;
+use summary::{Ending, Summary, Tally};
+
+/// Why a scene can't be simulated.
+#[derive(Debug, thiserror::Error)]
+pub enum SimulationError {
+    /// The plant has no equations of motion.
+    #[error(transparent)]
+    Model(#[from] ModelError),
+    /// The controller refuses its parameters.
+    #[error("control: {0}")]
+    Control(#[from] ParameterError),
+}
+
+/// A finished run.
+#[derive(Clone, Debug)]
+pub struct Run {
+    /// One sample a control tick, unless [`Simulation::sample_every`] said otherwise.
+    pub samples: Vec<Sample>,
+    /// The first fault of the controller, and the number of the tick that found it.
+    pub first_fault: Option<(u64, Raised)>,
+    /// The verdict.
+    pub summary: Summary,
+}
+
+/// A run that came to its end.
+struct Driven {
+    first_fault: Option<(u64, Raised)>,
+    tally: Tally,
+    ending: Ending,
+}
+
+impl Driven {
+    fn summary(self, last: Option<&Sample>) -> Summary {
+        self.tally.summary(self.ending, last)
+    }
+}
+
+/// A scene, ready to run with a controller.
+pub struct Simulation<C = Alone> {
+    name: String,
+    joint_names: Vec<String>,
+    ticks: u64,
+    period_us: u64,
+    /// Ticks from one sample to the next.
+    sample_ticks: u64,
+    motors: Motors,
+    delay_ticks: u32,
+    /// The force `f_d` when all of it acts, N.
+    force_n: f32,
+    ideal: bool,
+    encoders: Encoders,
+    injections: Injections,
+    controller: C,
+    plant: Plant,
+    observer: Observer,
+}
+
+impl Simulation {
+    /// Prepares a scene, with the tick alone for its controller.
+    ///
+    /// # Errors
+    /// What is wrong with its model or its gains.
+    pub fn new(scene: &Scene) -> Result<Self, SimulationError> {
+        Self::with_controller(scene, Alone::new(scene)?)
+    }
+
+    /// Runs to the end, or until the grasp is lost. `progress` is told the simulated time once in a while.
+    pub fn run(self, progress: impl FnMut(f64)) -> Run {
+        self.run_watched(progress, |_| {})
+    }
+
+    /// Runs as [`Self::run`], and shows the controller after each of its ticks, the one that arms the hand included.
+    pub fn run_watched(mut self, progress: impl FnMut(f64), watch: impl FnMut(&Alone)) -> Run {
+        let Ok(run) = self.try_run_watched(progress, watch);
+        run
+    }
+
+    /// Runs for the verdict alone: samples are summed up as they come, and not kept. `goes_on` is told the simulated time once
+    /// in a while; where it says no, the run ends there.
+    pub fn run_summed(mut self, goes_on: impl FnMut(f64) -> bool) -> Summary {
+        let mut last = None;
+        let Ok(driven) = self.drive(goes_on, |_| {}, |sample| last = Some(sample));
+        driven.summary(last.as_ref())
+    }
+}
+
+impl<C: Controller> Simulation<C> {
+    /// Prepares a scene. Its controller is disarmed.
+    ///
+    /// # Errors
+    /// What is wrong with the scene's model or its gains.
+    pub fn with_controller(scene: &Scene, controller: C) -> Result<Self, SimulationError> {
+        let plant = plant(scene)?;
+        Ok(Self {
+            name: scene.name.clone(),
+            joint_names: scene.joints.iter().map(|joint| joint.name.clone()).collect(),
+            ticks: (scene.duration_s / scene.control.period_s).round() as u64,
+            period_us: (scene.control.period_s * 1e6).round() as u64,
+            sample_ticks: 1,
+            motors: Motors::new(scene),
+            delay_ticks: scene.actuators.output_delay_ticks,
+            force_n: scene.control.force_n() as f32,
+            ideal: scene.sensors.ideal,
+            encoders: Encoders::new(scene),
+            injections: Injections::default(),
+            observer: Observer::new(laws(scene)?, &plant),
+            controller,
+            plant,
+        })
+    }
+
+    /// Keeps one sample in so many ticks instead of one a tick, and that of the last.
+    pub fn sample_every(&mut self, ticks: NonZeroU64) {
+        self.sample_ticks = ticks.get();
+    }
+
+    /// Lets something go wrong.
+    ///
+    /// # Panics
+    /// If the hand has no such joint.
+    pub fn inject(&mut self, injection: Injection) {
+        let joints = self.joint_names.len();
+        assert!(injection.kind.joint().is_none_or(|joint| joint < joints), "the hand has {joints} joints");
+        self.injections.push(injection);
+    }
+
+    /// The controller.
+    pub fn controller(&self) -> &C {
+        &self.controller
+    }
+
+    /// Runs to the end, or until the grasp is lost, or until the controller can't go on. `progress` is told the
+    /// simulated time once in a while.
+    ///
+    /// # Errors
+    /// Why the controller can't go on.
+    pub fn try_run(&mut self, progress: impl FnMut(f64)) -> Result<Run, C::Error> {
+        self.try_run_watched(progress, |_| {})
+    }
+
+    fn try_run_watched(
+        &mut self,
+        mut progress: impl FnMut(f64),
+        watch: impl FnMut(&C),
+    ) -> Result<Run, C::Error> {
+        let mut samples = Vec::with_capacity(self.ticks as usize + 1);
+        let goes_on = |t_s| {
+            progress(t_s);
+            true
+        };
+        let driven = self.drive(goes_on, watch, |sample| samples.push(sample))?;
+        Ok(Run { first_fault: driven.first_fault, summary: driven.summary(samples.last()), samples })
+    }
+
+    /// The loop. `keep` gets a sample a tick.
+    fn drive(
+        &mut self,
+        mut goes_on: impl FnMut(f64) -> bool,
+        mut watch: impl FnMut(&C),
+        mut keep: impl FnMut(Sample),
+    ) -> Result<Driven, C::Error> {
+        // The hand is armed while everything stands still.
+        let mut stepped = self.control(None, Some(Command::Arm))?;
+        watch(&self.controller);
+        let mut delay = Delay::new(self.delay_ticks, stepped.torques_nm);
+        let begun = Instant::now();
+        let mut tally = Tally::default();
+        let mut first_fault = None;
+        let mut lost = None;
+        let mut duration_s = self.time_s(self.ticks);
+        for tick in 0..=self.ticks {
+            let t_s = self.time_s(tick);
+            if tick % 100 == 0 && !goes_on(t_s) {
+                duration_s = t_s;
+                break;
+            }
+            // 1, 2: sense and control. The first tick is told to grasp.
+            stepped = self.control(Some(tick), (tick == 0).then_some(Command::Grasp(Grasp::CONFIGURED)))?;
+            watch(&self.controller);
+            first_fault = first_fault.or(stepped.fault.map(|raised| (tick, raised)));
+            let wanted_nm = delay.pass(stepped.torques_nm);
+            let record = |sample: Sample| {
+                tally.see(&sample);
+                keep(sample);
+            };
+            if let Err(reason) = self.move_on(tick, &wanted_nm, &stepped, record) {
+                (lost, duration_s) = (Some(reason), reason.0);
+                break;
+            }
+        }
+        let wall_s = begun.elapsed().as_secs_f64();
+        let fault = stepped.fault.map(|raised| self.in_words(raised));
+        let ending = Ending { scene: self.name.clone(), duration_s, lost, fault, wall_s };
+        Ok(Driven { first_fault, tally, ending })
+    }
+
+    /// Time of a tick, s. From whole microseconds, so that it prints as what it is.
+    fn time_s(&self, tick: u64) -> f64 {
+        (tick * self.period_us) as f64 / 1e6
+    }
+
+    /// A fault, with the joint's name.
+    fn in_words(&self, raised: Raised) -> String {
+        let joint = raised.joint.and_then(|joint| self.joint_names.get(usize::from(joint)));
+        let joint = joint.map_or(String::new(), |name| format!("joint `{name}`: "));
+        format!("fault {}: {joint}{}", raised.fault.number(), raised.fault.words())
+    }
+
+    /// One tick of the controller, with the joints as they are now. `tick` is none before the grasp.
+    fn control(&mut self, tick: Option<u64>, command: Option<Command>) -> Result<Stepped, C::Error> {
+        let motion = self.plant.motion();
+        let (angles_rad, speeds_rad_s) =
+            (motion.angles_rad.map(|v| v as f32), motion.speeds_rad_s.map(|v| v as f32));
+        let counts = if self.ideal { [0; MAX_JOINTS] } else { self.encoders.read(&motion.angles_rad) };
+        let mut sensing = Sensing { counts, failed: None, late: false, reach: Reach::Everything };
+        if let Some(tick) = tick {
+            self.injections.apply(tick, &mut sensing);
+        }
+        let sensed = match sensing.failed {
+            Some(raised) => Sensed::Failed(raised),
+            None if self.ideal => Sensed::Ideal { angles_rad: &angles_rad, speeds_rad_s: &speeds_rad_s },
+            None => Sensed::Counts(&sensing.counts),
+        };
+        self.controller.step(&Turn { sensed, late: sensing.late, command, reach: sensing.reach })
+    }
+
+    /// What the torques do in one control period.
+    fn move_on(
+        &mut self,
+        tick: u64,
+        wanted_nm: &[f32; MAX_JOINTS],
+        stepped: &Stepped,
+        mut record: impl FnMut(Sample),
+    ) -> Result<(), (f64, Lost)> {
+        let joints = self.joint_names.len();
+        let (angles_rad, speeds_rad_s) =
+            (stepped.angles_rad.map(f64::from), stepped.speeds_rad_s.map(f64::from));
+        let force_share = if self.force_n > 0.0 { f64::from(stepped.force_n / self.force_n) } else { 0.0 };
+        let observer = &self.observer;
+        let t_s = self.time_s(tick);
+        let sampled = tick.is_multiple_of(self.sample_ticks) || tick == self.ticks;
+        // 3, 4: actuate, plant; 5: record.
+        let moved = self.motors.turn(&mut self.plant, wanted_nm, |plant, applied_nm| {
+            if !sampled {
+                return;
+            }
+            let seen = Seen {
+                angles_rad: &angles_rad[..joints],
+                speeds_rad_s: &speeds_rad_s[..joints],
+                torques_nm: &applied_nm[..joints],
+                force_share,
+                mode: stepped.mode.words(),
+            };
+            record(observer.sample(t_s, plant, &seen));
+        });
+        moved.map_err(|(substep, lost)| {
+            let at_s = (self.period_us * substep as u64) as f64 / (1e6 * self.motors.substeps as f64);
+            (t_s + at_s, lost)
+        })
+    }
+}
+
+/// The plant of a scene, as everything is at the start.
+///
+/// # Errors
+/// A model that has no equations of motion.
+pub fn plant(scene: &Scene) -> Result<Plant, ModelError> {
+    let mut angles_rad = [0.0; MAX_JOINTS];
+    angles_rad[..scene.start.angles_rad.len()].copy_from_slice(&scene.start.angles_rad);
+    let start = Motion::at_rest(angles_rad, scene.start.position_m, scene.start.attitude);
+    Plant::new(model(scene), start, scene.plant.substep_s)
+}
+
+/// The control laws of a scene in the precision of the plant.
+///
+/// # Errors
+/// A gain that is out of its range.
+pub fn laws(scene: &Scene) -> Result<Laws<f64, MAX_JOINTS>, ParameterError> {
+    scene.laws_config().prepare(&scene.hand)
+}
+
+/// The plant of a scene.
+pub fn model(scene: &Scene) -> PlantModel {
+    let gravity = Vector3::from(scene.plant.gravity_m_s2);
+    PlantModel {
+        hand: scene.hand.clone(),
+        fingertips: scene.fingertips.clone(),
+        friction: scene.joints.iter().map(|joint| joint.friction).collect(),
+        object: ObjectModel {
+            shape: scene.object.clone(),
+            mass_kg: scene.mass_kg,
+            inertia_kg_m2: scene.inertia_kg_m2,
+        },
+        faces: scene.contacts.clone(),
+        hand_gravity_m_s2: gravity,
+        object_gravity_m_s2: if scene.plant.gravity_on_object { gravity } else { Vector3::zeros() },
+        pushes: scene.plant.pushes.iter().map(PushFile::push).collect(),
+    }
+}

@@ -1,0 +1,120 @@
+//! A simulation recorded as a hand would be: the payloads that its device would send, a full record each tick, and
+//! a snapshot of the controller's state in the first and every thousandth.
+//!
+//! There is no link: nothing is sent, nothing is lost, every number is exact, and times count from the start of the run.
+
+use super::controller::Alone;
+use blindgrasp_body::{MAX_FINGERS, MAX_JOINTS};
+use blindgrasp_model::{HandFile, Scene};
+use blindgrasp_record::mcap::{About, Device, RecordingError, Saved, Setting, Stamp, Writer};
+use blindgrasp_shared::identity::{Clock, Identity, Image};
+use blindgrasp_shared::link::message::Reply;
+use blindgrasp_shared::telemetry::snapshot::{BYTES_PER_JOINT, PART_BYTES, Part};
+use blindgrasp_shared::telemetry::{INTERFACE_VERSION, List};
+use std::path::Path;
+
+/// Ticks from one snapshot to the next.
+const SNAPSHOT_TICKS: u64 = 1000;
+/// Bytes that suffice for every snapshot.
+const MOST_SNAPSHOT: usize =
+    BYTES_PER_JOINT * if MAX_JOINTS > MAX_FINGERS { MAX_JOINTS } else { MAX_FINGERS };
+
+/// Records a simulation, until something goes wrong.
+pub struct Recorder {
+    writer: Writer,
+    device: Device,
+    period_ns: u64,
+    tick: u64,
+    buffer: Vec<u8>,
+    failure: Option<RecordingError>,
+}
+
+impl Recorder {
+    /// Makes the file, and writes who the hand is.
+    ///
+    /// # Errors
+    /// The file can't be made.
+    pub fn create(
+        path: &Path,
+        force: bool,
+        scene: &Scene,
+        controller: &Alone,
+    ) -> Result<Self, RecordingError> {
+        // The gains are the scene's, as they were its controller's.
+        let hand = HandFile { control: Some(scene.control.clone()), ..scene.file.hand.clone() };
+        let mut about = About::of(&Identity::of(
+            Image {
+                interface_version: INTERFACE_VERSION,
+                kind: "sim",
+                hand: &hand.name,
+                hand_hash: 0,
+                firmware_version: env!("CARGO_PKG_VERSION"),
+                build_hash: 0,
+                joint_count: u8::try_from(hand.joints.len()).unwrap_or(u8::MAX),
+                fingertip_count: u8::try_from(hand.fingertips.len()).unwrap_or(u8::MAX),
+                period_us: controller.params().period().microseconds(),
+            },
+            Clock::Emulated,
+        ))
+        .with_hand(&hand);
+        about.hand_hash = about.hand_model().map_or(0, |model| model.hash());
+        about.scene = Some(scene.effective_toml());
+        let mut writer = Writer::create(path, force)?;
+        let device = writer.add_device("hand");
+        writer.about(device, Stamp(0), &about)?;
+        writer.parameters(device, Stamp(0), &Setting::all(controller.params()))?;
+        let period_ns = u64::from(about.period_us) * 1000;
+        Ok(Self { writer, device, period_ns, tick: 0, buffer: Vec::new(), failure: None })
+    }
+
+    /// Takes what the controller did in a tick. What can't be written ends the recording, and is told at its end.
+    pub fn tick(&mut self, controller: &Alone) {
+        if self.failure.is_none() {
+            self.failure = self.write(controller).err();
+            self.tick += 1;
+        }
+    }
+
+    fn write(&mut self, controller: &Alone) -> Result<(), RecordingError> {
+        let Some(record) = controller.record() else { return Ok(()) };
+        let at = Stamp(self.tick * self.period_ns);
+        self.say(at, &Reply::Record(record.clone()))?;
+        if self.tick.is_multiple_of(SNAPSHOT_TICKS) {
+            let mut snapshot = [0; MOST_SNAPSHOT];
+            let whole = controller.state().save(controller.params(), &mut snapshot).unwrap_or_default();
+            let length = u16::try_from(whole.len()).unwrap_or(u16::MAX);
+            for (k, piece) in whole.chunks(PART_BYTES).enumerate() {
+                let mut bytes = [0; PART_BYTES];
+                bytes[..piece.len()].copy_from_slice(piece);
+                self.say(
+                    at,
+                    &Reply::Snapshot(Part {
+                        tick: record.tick,
+                        offset: (k * PART_BYTES) as u16,
+                        length,
+                        bytes: List::first_of(bytes, piece.len()),
+                    }),
+                )?;
+            }
+        }
+        Ok(())
+    }
+
+    fn say(&mut self, at: Stamp, reply: &Reply<'_, MAX_JOINTS>) -> Result<(), RecordingError> {
+        self.buffer.resize(Reply::<MAX_JOINTS>::MOST_BYTES, 0);
+        // The buffer is as large as the largest reply.
+        let payload = postcard::to_slice(reply, &mut self.buffer).map_or(&[][..], |payload| payload);
+        self.writer.received(self.device, at, payload).map(|_| ())
+    }
+
+    /// Ends the recording.
+    ///
+    /// # Errors
+    /// What went wrong since its beginning.
+    pub fn finish(self) -> Result<Saved, RecordingError> {
+        match self.failure {
+            Some(failure) => Err(failure),
+            None => self.writer.finish(),
+        }
+    }
+}

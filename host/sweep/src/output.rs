@@ -1,0 +1,154 @@
+//! The files of a sweep: the table, its pictures, and the journal while it is not done.
+
+use super::picture;
+use super::plan::Plan;
+use super::run::Row;
+use super::table::Columns;
+use blindgrasp_record::table::{self, Format, TableError};
+use std::fs::{self, File};
+use std::io::{self, Write as _};
+use std::path::{Path, PathBuf};
+use thiserror::Error;
+
+/// Where a sweep is written to.
+#[derive(Clone, Debug)]
+pub struct Output {
+    path: PathBuf,
+    format: Format,
+}
+
+/// Why a sweep can't be written.
+#[derive(Debug, Error)]
+pub enum OutputError {
+    /// Its ending says nothing.
+    #[error("--out: {}: a sweep is written to a file that ends in .parquet or .csv", path.display())]
+    Ending {
+        /// The file.
+        path: PathBuf,
+    },
+    /// There is such a file, and no journal that says that it is this sweep's.
+    #[error("{}: is there already; choose another --out, or overwrite it with --force", path.display())]
+    Exists {
+        /// The file.
+        path: PathBuf,
+    },
+    /// The file system said no.
+    #[error("cannot write {}", path.display())]
+    Io {
+        /// The file.
+        path: PathBuf,
+        /// What it said.
+        source: io::Error,
+    },
+    /// The table can't be written.
+    #[error("{}", path.display())]
+    Table {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        source: TableError,
+    },
+    /// A picture can't be drawn.
+    #[error("cannot draw {}: {reason}", path.display())]
+    Draw {
+        /// The file that it was for.
+        path: PathBuf,
+        /// What the drawing library said.
+        reason: String,
+    },
+}
+
+impl Output {
+    /// Chooses a file by its path, which says what it is.
+    ///
+    /// # Errors
+    /// It ends neither in `.parquet` nor in `.csv`.
+    pub fn choose(path: &Path) -> Result<Self, OutputError> {
+        let format = match path.extension().and_then(|ending| ending.to_str()) {
+            Some("parquet") => Format::Parquet,
+            Some("csv") => Format::Csv,
+            _ => return Err(OutputError::Ending { path: path.to_owned() }),
+        };
+        Ok(Self { path: path.to_owned(), format })
+    }
+
+    /// The table's file.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// The journal's: beside the table.
+    pub fn journal(&self) -> PathBuf {
+        let mut name = self.path.clone().into_os_string();
+        name.push(".journal");
+        name.into()
+    }
+
+    /// Makes the directory, and makes sure that nothing is overwritten: not without `force`, and not unless there is a journal,
+    /// which says that what is there is this sweep's.
+    ///
+    /// # Errors
+    /// A file is there, or a directory in its place; or what the file system says.
+    pub fn prepare(&self, plan: &Plan, force: bool) -> Result<(), OutputError> {
+        if let Some(folder) = self.path.parent() {
+            fs::create_dir_all(folder)
+                .map_err(|source| OutputError::Io { path: folder.to_owned(), source })?;
+        }
+        let may_overwrite = force || self.journal().exists();
+        for path in [self.path.clone()].into_iter().chain(self.pictures(plan)) {
+            if path.is_dir() {
+                return Err(OutputError::Io { path, source: io::ErrorKind::IsADirectory.into() });
+            }
+            if path.exists() && !may_overwrite {
+                return Err(OutputError::Exists { path });
+            }
+        }
+        Ok(())
+    }
+
+    /// The files of the pictures that a sweep has.
+    pub fn pictures(&self, plan: &Plan) -> Vec<PathBuf> {
+        let endings = if picture::is_drawn(plan) { &["png", "svg"][..] } else { &[] };
+        endings.iter().map(|ending| self.path.with_extension(ending)).collect()
+    }
+
+    /// Writes pictures and table, each in one piece: it is there as a whole or not at all. The table is written last.
+    ///
+    /// # Errors
+    /// The first file that can't be written.
+    pub fn write(&self, plan: &Plan, rows: &[Row]) -> Result<(), OutputError> {
+        if let Some(drawn) = picture::draw(plan, rows) {
+            for (path, bytes) in self.pictures(plan).into_iter().zip(drawn) {
+                let bytes = bytes.map_err(|reason| OutputError::Draw { path: path.clone(), reason })?;
+                in_one_piece(&path, |file| {
+                    file.write_all(&bytes).map_err(|source| OutputError::Io { path: path.clone(), source })
+                })?;
+            }
+        }
+        in_one_piece(&self.path, |file| {
+            let write = || {
+                let mut table = table::create(self.format, file, Columns::new(plan, rows))?;
+                table.write(rows)?;
+                table.finish()
+            };
+            write().map_err(|source| OutputError::Table { path: self.path.clone(), source })
+        })
+    }
+}
+
+/// Writes a file under another name first, and renames it once it is whole and on the disk.
+fn in_one_piece(
+    path: &Path,
+    write: impl FnOnce(&mut File) -> Result<(), OutputError>,
+) -> Result<(), OutputError> {
+    let mut partial = path.to_owned().into_os_string();
+    partial.push(".partial");
+    let partial = PathBuf::from(partial);
+    let failed = |source| OutputError::Io { path: path.to_owned(), source };
+    let mut file = File::create(&partial).map_err(failed)?;
+    let written = write(&mut file).and_then(|()| file.sync_all().map_err(failed));
+    written.and_then(|()| fs::rename(&partial, path).map_err(failed)).inspect_err(|_| {
+        // It is of no use to anybody.
+        let _ = fs::remove_file(&partial);
+    })
+}

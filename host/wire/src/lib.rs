@@ -1,0 +1,166 @@
+//! What goes over the wire, as the host has it: the messages of a hand of any size, and what they say.
+
+use blindgrasp_body::MAX_JOINTS;
+use blindgrasp_shared::command::Refusal;
+use blindgrasp_shared::control::{GAIN_COUNT, Signal};
+use blindgrasp_shared::estimate::Encoder;
+use blindgrasp_shared::identity::{BrownOut, Clock, Crash, Identity, ResetCause, Restored};
+use blindgrasp_shared::link::message;
+use blindgrasp_shared::parameters::{Parameter, Setting};
+use blindgrasp_shared::signals::Value;
+use blindgrasp_shared::telemetry::{self, INTERFACE_VERSION};
+
+/// A request with its session and number.
+pub type Packet = message::Packet<MAX_JOINTS>;
+/// A request.
+pub type Request = message::Request<MAX_JOINTS>;
+/// The joints of a tick.
+pub type Sample = message::Sample<MAX_JOINTS>;
+/// What a tick did.
+pub type Record = telemetry::Record<MAX_JOINTS>;
+
+/// What a firmware says of itself.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Firmware {
+    /// All of it in a line.
+    pub words: String,
+    /// `hand` or `pil`.
+    pub kind: String,
+    /// Name of its hand.
+    pub hand: String,
+    /// CRC-32 of its hand's model and configuration.
+    pub hand_hash: u32,
+    /// Joints of its hand.
+    pub joint_count: usize,
+    /// What gives it its time.
+    pub clock: Clock,
+    /// Why it started.
+    pub reset: ResetCause,
+    /// How it ended before, if that was not in order.
+    pub crash: Option<Crash>,
+    /// Level of its brown-out reset.
+    pub brown_out: BrownOut,
+    /// Frequency of the clock that its cycles are counted in, Hz; 0 where nothing counts them.
+    pub clock_hz: u32,
+    /// The parameters that differ from the hand's file.
+    pub changed: Vec<Parameter>,
+    /// What became at its start of the parameters that were saved; `None` where there is nothing to save to.
+    pub restored: Option<Restored>,
+}
+
+impl From<&Identity<'_>> for Firmware {
+    fn from(identity: &Identity<'_>) -> Self {
+        let &Identity { image, clock, reset, crash, brown_out, clock_hz, changed, restored, .. } = identity;
+        let is_changed = |parameter: &Parameter| changed & (1 << parameter.number()) != 0;
+        Self {
+            words: image.to_string(),
+            kind: image.kind.to_owned(),
+            hand: image.hand.to_owned(),
+            hand_hash: image.hand_hash,
+            joint_count: usize::from(image.joint_count),
+            clock,
+            reset,
+            crash,
+            brown_out,
+            clock_hz,
+            changed: Parameter::ALL.into_iter().filter(is_changed).collect(),
+            restored,
+        }
+    }
+}
+
+/// The answer to a request.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Answer {
+    /// To `Hello`.
+    Identity {
+        /// Number of the session.
+        session: u16,
+        /// Who it is.
+        firmware: Firmware,
+    },
+    /// It is done.
+    Done,
+    /// It was refused.
+    Refused(Refusal),
+    /// To `GetParameter`.
+    Value(Setting),
+    /// To `Burst`.
+    Burst {
+        /// How many records there are.
+        count: u16,
+        /// The one that was asked for.
+        record: Box<Record>,
+    },
+}
+
+/// What came of a tick.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Turned {
+    /// The answer to the request that it took.
+    pub answer: Option<Answer>,
+    /// What it did.
+    pub record: Record,
+}
+
+/// Takes the value of a parameter among the encoders of a hand, if it is a sign or a zero of theirs.
+pub fn take_encoder(encoders: &mut [Encoder], parameter: Parameter, index: u8, value: f32) {
+    if let Some(encoder) = encoders.get_mut(usize::from(index)) {
+        match parameter {
+            Parameter::ENCODER_REVERSED => encoder.reversed = value != 0.0,
+            Parameter::ENCODER_ZERO => encoder.zero_count = value as i32,
+            _ => {}
+        }
+    }
+}
+
+/// The interface version of a firmware whose introduction can't be read: that is what every version begins with.
+pub fn other_interface(payload: &[u8]) -> Option<u16> {
+    let (identity, _, _, theirs) = postcard::take_from_bytes::<(u8, u16, u16, u16)>(payload).ok()?.0;
+    (identity == 0 && theirs != INTERFACE_VERSION).then_some(theirs)
+}
+
+/// A request in words.
+pub fn in_words(packet: Option<&Packet>) -> String {
+    let Some(packet) = packet else { return "the joints of a tick".to_owned() };
+    match packet.request {
+        Request::Hello { .. } => "`hello`".to_owned(),
+        Request::Command(command) => format!("`{}`", command.words()),
+        Request::Heartbeat => "a heartbeat".to_owned(),
+        Request::SetParameter { parameter, index, value } => format!("`{parameter}` [{index}] = {value}"),
+        Request::GetParameter { parameter, index } => format!("what `{parameter}` [{index}] is"),
+        Request::Telemetry { .. } => "`telemetry`".to_owned(),
+        Request::Burst { index } => format!("record {index} of the burst"),
+        Request::Joints(_) => "the joints of a tick".to_owned(),
+        Request::Goodbye => "goodbye".to_owned(),
+        Request::Rate { baud } => format!("a line of {baud} baud"),
+        Request::Zero { .. } => "`zero`".to_owned(),
+        Request::Confirm => "`confirm`".to_owned(),
+        Request::Save => "`save`".to_owned(),
+        Request::Defaults => "`defaults`".to_owned(),
+    }
+}
+
+/// What a record tells of the whole hand in numbers that are worth a plot, in the order of the table of signals: real ones, and
+/// the time that the tick took.
+pub fn scalars(record: &Record) -> Vec<(Signal, f32)> {
+    let mut scalars = Vec::with_capacity(16);
+    record.tell(|told| match told.value {
+        Value::Real(value) => scalars.push((told.signal, value)),
+        Value::Whole(cycles) if told.signal.unit == "cycles" => scalars.push((told.signal, cycles as f32)),
+        _ => {}
+    });
+    scalars
+}
+
+/// The scalars that are potentials of the laws: behind their gains.
+pub const fn potentials() -> std::ops::Range<usize> {
+    GAIN_COUNT..2 * GAIN_COUNT
+}
+
+/// A signal's name for readers: without the unit at its end, and with spaces.
+pub fn label(signal: &Signal) -> String {
+    let unit: String = signal.unit.to_lowercase().replace(' ', "").replace('/', "_");
+    let bare = signal.key.strip_suffix(&unit).and_then(|key| key.strip_suffix('_'));
+    bare.filter(|_| !unit.is_empty()).unwrap_or(signal.key).replace('_', " ")
+}
