@@ -3,9 +3,10 @@
 use super::earlier::Comparison;
 use super::evidence::{Done, Evidence, EvidenceError};
 use blindgrasp_model::Scene;
+use blindgrasp_plots::run::{figure, force_panels, joint_panels, object_panels, residual_component_panels};
+use blindgrasp_plots::{Along, Axis, Dash, Figure, Line, Panel};
 use blindgrasp_sim::sample::Sample;
-use blindgrasp_view::plots::{figure, force_panels, joint_panels, object_panels, residual_component_panels};
-use blindgrasp_view::{Along, Axis, Dash, Figure, Files, Line, Panel, Report, Strip, colour};
+use blindgrasp_view::{Files, Report, Strip, colour};
 
 /// When the hand-arm is looked at, s.
 const MOMENTS_S: [f64; 6] = [0.0, 0.5, 1.0, 2.0, 5.0, 20.0];

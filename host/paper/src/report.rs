@@ -10,7 +10,7 @@ use super::figures::{self, Drawing, Drawn};
 use super::plan::PLAN;
 use super::polyhedra::{self, Polyhedra};
 use super::sensitivity::{self, SWEEPS, Sweep};
-use blindgrasp_view::Along;
+use blindgrasp_plots::Along;
 use serde_json::{Value, json};
 use std::time::Instant;
 

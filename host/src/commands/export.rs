@@ -56,6 +56,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
         To::Csv => (Format::Csv, "csv"),
         To::Parquet => (Format::Parquet, "parquet"),
     };
+    format.check()?;
     let recording = Recording::open(&arguments.file)?;
     let request = Request {
         device: chosen_device(&recording, arguments.device.as_deref())?,

@@ -1,10 +1,27 @@
 //! `blindgrasp flash`: firmware onto a microcontroller, over a debug probe.
 
 use super::Outcome;
+use anyhow::{Context, bail};
+use blindgrasp::device::flash::logs::Logs;
+use blindgrasp::device::flash::monitor::{self, Event};
+use blindgrasp::device::flash::probe::{attach, choose, describe, with_options};
+use blindgrasp::device::flash::{Chip, Phase, Progress, download};
 use blindgrasp::device::image::Kind;
+use blindgrasp::device::image::{BUILD_HINT, ExpectedHand, Firmware, Footprint, Kind};
+use blindgrasp::device::options;
 use blindgrasp::device::options::Level;
+use blindgrasp::model::HandModel;
 use clap::Args;
+use indicatif::{ProgressBar, ProgressStyle};
+use probe_rs::probe::list::Lister;
+use serde::Serialize;
+use std::fs;
+use std::io::{self, Write};
 use std::path::PathBuf;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{SystemTime, UNIX_EPOCH};
 
 /// Check a firmware image and write it to the hand's microcontroller over a debug probe
 ///
@@ -13,8 +30,6 @@ use std::path::PathBuf;
 ///
 /// Exit code 0: flashed, or nothing against it (--dry-run); 2: refused or failed, with the reason.
 #[derive(Args)]
-// Without the feature the arguments are read, but nothing is done with them.
-#[cfg_attr(not(feature = "probe"), allow(dead_code))]
 pub(crate) struct Arguments {
     /// The image, an ELF file [default: the one of its kind that was built last in target/]
     image: Option<PathBuf>,
@@ -51,294 +66,251 @@ pub(crate) struct Arguments {
     json: bool,
 }
 
-/// Says how to get the command.
-#[cfg(not(feature = "probe"))]
-pub(crate) fn run(_: &Arguments) -> anyhow::Result<Outcome> {
-    anyhow::bail!(
-        "this build cannot use debug probes; build it with them: \
-        `cargo run --release --features probe -- flash` and the same arguments"
-    )
+/// Larger files are no images of a microcontroller, bytes.
+const LARGEST_FILE_BYTES: u64 = 256 << 20;
+
+/// What is printed.
+#[derive(Serialize)]
+struct Report<'a> {
+    image: String,
+    chip: &'a str,
+    kind: &'a str,
+    hand: &'a str,
+    hand_hash: String,
+    /// Whether `--hand` gave a hand that the image was compared with.
+    hand_checked: bool,
+    interface_version: u16,
+    firmware_version: &'a str,
+    build_hash: String,
+    joint_count: u8,
+    fingertip_count: u8,
+    period_us: u32,
+    flash: Use,
+    ram: Use,
+    stack_bytes: u64,
+    flashed: bool,
+    verified: bool,
+    /// The brown-out level before, and as it was set.
+    brown_out: Option<[String; 2]>,
+}
+
+#[derive(Serialize)]
+struct Use {
+    used_bytes: u64,
+    available_bytes: u64,
 }
 
 /// Runs the command.
-#[cfg(feature = "probe")]
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
-    probe::run(arguments)
+    let path = match &arguments.image {
+        Some(path) => path.clone(),
+        None => newest_image(arguments.kind)?,
+    };
+    let file = read(&path)?;
+    let about = || format!("image {}", path.display());
+    let firmware = Firmware::parse(&file).with_context(about)?;
+    let expected = arguments.hand.as_deref().map(expected_hand).transpose()?;
+    firmware.check_purpose(arguments.kind, expected.as_ref()).with_context(about)?;
+    let chip = Chip::by_name(&arguments.chip)?;
+    let footprint = chip.check(&firmware).with_context(|| format!("{} on {}", about(), chip.name()))?;
+    let follow = if arguments.monitor { Some(follower(&firmware, &file).with_context(about)?) } else { None };
+
+    let mut report = report(&path, &chip, &firmware, &footprint, expected.is_some());
+    if arguments.dry_run {
+        return print(&report, arguments.json);
+    }
+    let info = choose(&Lister::new(), arguments.probe.as_deref())?;
+    eprintln!("blindgrasp: probe {}; the joints must be without power", describe(&info));
+    let mut session = attach(&info, &chip, firmware.device)?;
+    if arguments.brown_out.is_some() {
+        with_options(&mut session, &chip, |core| options::unprotected(core).map(|_| ()))?;
+    }
+    let bars = Bars::new();
+    let verify = arguments.verify || !arguments.no_verify;
+    let written = download(&mut session, &chip, &firmware, verify, |progress| bars.show(progress));
+    bars.0.finish_and_clear();
+    written?;
+    if let Some(level) = arguments.brown_out {
+        let before = with_options(&mut session, &chip, |core| options::set_brown_out(core, level))?;
+        report.brown_out = Some([before.to_string(), level.to_string()]);
+    }
+    monitor::start(&mut session, firmware.rtt_control_block)?;
+    (report.flashed, report.verified) = (true, verify);
+    let outcome = print(&report, arguments.json)?;
+    if let Some((control_block, logs)) = follow {
+        let stop = stop_at_interrupt()?;
+        eprintln!("blindgrasp: logs of the firmware, with the time of this host in UTC; Ctrl-C ends");
+        // The same probe, by its serial number: it may come back elsewhere on the bus.
+        let connect = || attach(&info, &chip, firmware.device).ok();
+        monitor::follow(session, connect, control_block, &logs, &stop, show)?;
+    }
+    Ok(outcome)
 }
 
-#[cfg(feature = "probe")]
-mod probe {
-    use super::Arguments;
-    use crate::commands::Outcome;
-    use anyhow::{Context, bail};
-    use blindgrasp::device::flash::logs::Logs;
-    use blindgrasp::device::flash::monitor::{self, Event};
-    use blindgrasp::device::flash::probe::{attach, choose, describe, with_options};
-    use blindgrasp::device::flash::{Chip, Phase, Progress, download};
-    use blindgrasp::device::image::{BUILD_HINT, ExpectedHand, Firmware, Footprint, Kind};
-    use blindgrasp::device::options;
-    use blindgrasp::model::HandModel;
-    use indicatif::{ProgressBar, ProgressStyle};
-    use probe_rs::probe::list::Lister;
-    use serde::Serialize;
-    use std::fs;
-    use std::io::{self, Write};
-    use std::path::{Path, PathBuf};
-    use std::sync::Arc;
-    use std::sync::atomic::{AtomicBool, Ordering};
-    use std::time::{SystemTime, UNIX_EPOCH};
+/// The image of a kind that was built last, by either toolchain.
+fn newest_image(kind: Kind) -> anyhow::Result<PathBuf> {
+    let here = std::env::current_dir().context("cannot tell the current directory")?;
+    let target = match std::env::var_os("CARGO_TARGET_DIR") {
+        Some(directory) => here.join(directory),
+        None => here.ancestors().find(|at| at.join("Cargo.lock").is_file()).unwrap_or(&here).join("target"),
+    };
+    let candidates = [target.clone(), target.join("debian")]
+        .map(|directory| directory.join("thumbv7em-none-eabihf/firmware").join(kind.name()));
+    let built = |path: &PathBuf| fs::metadata(path).and_then(|metadata| metadata.modified()).ok();
+    let newest = candidates.iter().filter_map(|path| Some((built(path)?, path))).max();
+    let Some((_, path)) = newest else {
+        bail!("there is no image at {}; build one with {BUILD_HINT}", candidates[0].display());
+    };
+    Ok(path.clone())
+}
 
-    /// Larger files are no images of a microcontroller, bytes.
-    const LARGEST_FILE_BYTES: u64 = 256 << 20;
-
-    /// What is printed.
-    #[derive(Serialize)]
-    struct Report<'a> {
-        image: String,
-        chip: &'a str,
-        kind: &'a str,
-        hand: &'a str,
-        hand_hash: String,
-        /// Whether `--hand` gave a hand that the image was compared with.
-        hand_checked: bool,
-        interface_version: u16,
-        firmware_version: &'a str,
-        build_hash: String,
-        joint_count: u8,
-        fingertip_count: u8,
-        period_us: u32,
-        flash: Use,
-        ram: Use,
-        stack_bytes: u64,
-        flashed: bool,
-        verified: bool,
-        /// The brown-out level before, and as it was set.
-        brown_out: Option<[String; 2]>,
+fn read(path: &Path) -> anyhow::Result<Vec<u8>> {
+    let about = || format!("cannot read the image {}", path.display());
+    let metadata = fs::metadata(path).with_context(about)?;
+    if !metadata.is_file() || metadata.len() > LARGEST_FILE_BYTES {
+        bail!("{} is no image of a microcontroller; give the ELF file that cargo links", path.display());
     }
+    fs::read(path).with_context(about)
+}
 
-    #[derive(Serialize)]
-    struct Use {
-        used_bytes: u64,
-        available_bytes: u64,
+/// What the firmware must have for its logs to be followed.
+fn follower(firmware: &Firmware<'_>, file: &[u8]) -> anyhow::Result<(u64, Logs)> {
+    let logs = Logs::parse(file)?;
+    let control_block = firmware.rtt_control_block.context(
+        "the image has no symbol _SEGGER_RTT, so that its logs cannot be found; do not strip it of symbols",
+    )?;
+    Ok((control_block, logs))
+}
+
+/// The hand of a file, with the hash that firmware built for it has.
+fn expected_hand(path: &Path) -> anyhow::Result<ExpectedHand> {
+    let text = path.to_str().context("the path after --hand is not UTF-8")?;
+    let model = HandModel::load(text)?;
+    Ok(ExpectedHand { hash: model.hash(), name: model.name })
+}
+
+fn report<'a>(
+    path: &Path,
+    chip: &'a Chip,
+    firmware: &'a Firmware<'_>,
+    footprint: &Footprint,
+    hand_checked: bool,
+) -> Report<'a> {
+    let image = &firmware.image;
+    Report {
+        image: path.display().to_string(),
+        chip: chip.name(),
+        kind: image.kind,
+        hand: image.hand,
+        hand_hash: format!("{:08x}", image.hand_hash),
+        hand_checked,
+        interface_version: image.interface_version,
+        firmware_version: image.firmware_version,
+        build_hash: format!("{:08x}", image.build_hash),
+        joint_count: image.joint_count,
+        fingertip_count: image.fingertip_count,
+        period_us: image.period_us,
+        flash: Use { used_bytes: footprint.flash_used_bytes, available_bytes: footprint.flash_bytes },
+        ram: Use { used_bytes: footprint.ram_used_bytes, available_bytes: footprint.ram_bytes },
+        stack_bytes: footprint.stack_bytes,
+        flashed: false,
+        verified: false,
+        brown_out: None,
     }
+}
 
-    pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
-        let path = match &arguments.image {
-            Some(path) => path.clone(),
-            None => newest_image(arguments.kind)?,
-        };
-        let file = read(&path)?;
-        let about = || format!("image {}", path.display());
-        let firmware = Firmware::parse(&file).with_context(about)?;
-        let expected = arguments.hand.as_deref().map(expected_hand).transpose()?;
-        firmware.check_purpose(arguments.kind, expected.as_ref()).with_context(about)?;
-        let chip = Chip::by_name(&arguments.chip)?;
-        let footprint = chip.check(&firmware).with_context(|| format!("{} on {}", about(), chip.name()))?;
-        let follow =
-            if arguments.monitor { Some(follower(&firmware, &file).with_context(about)?) } else { None };
+fn print(report: &Report<'_>, json: bool) -> anyhow::Result<Outcome> {
+    let text = if json { serde_json::to_string(report)? + "\n" } else { describe_report(report) };
+    io::stdout().lock().write_all(text.as_bytes()).context("cannot print the result")?;
+    Ok(Outcome::Shown)
+}
 
-        let mut report = report(&path, &chip, &firmware, &footprint, expected.is_some());
-        if arguments.dry_run {
-            return print(&report, arguments.json);
-        }
-        let info = choose(&Lister::new(), arguments.probe.as_deref())?;
-        eprintln!("blindgrasp: probe {}; the joints must be without power", describe(&info));
-        let mut session = attach(&info, &chip, firmware.device)?;
-        if arguments.brown_out.is_some() {
-            with_options(&mut session, &chip, |core| options::unprotected(core).map(|_| ()))?;
-        }
-        let bars = Bars::new();
-        let verify = arguments.verify || !arguments.no_verify;
-        let written = download(&mut session, &chip, &firmware, verify, |progress| bars.show(progress));
-        bars.0.finish_and_clear();
-        written?;
-        if let Some(level) = arguments.brown_out {
-            let before = with_options(&mut session, &chip, |core| options::set_brown_out(core, level))?;
-            report.brown_out = Some([before.to_string(), level.to_string()]);
-        }
-        monitor::start(&mut session, firmware.rtt_control_block)?;
-        (report.flashed, report.verified) = (true, verify);
-        let outcome = print(&report, arguments.json)?;
-        if let Some((control_block, logs)) = follow {
-            let stop = stop_at_interrupt()?;
-            eprintln!("blindgrasp: logs of the firmware, with the time of this host in UTC; Ctrl-C ends");
-            // The same probe, by its serial number: it may come back elsewhere on the bus.
-            let connect = || attach(&info, &chip, firmware.device).ok();
-            monitor::follow(session, connect, control_block, &logs, &stop, show)?;
-        }
-        Ok(outcome)
-    }
-
-    /// The image of a kind that was built last, by either toolchain.
-    fn newest_image(kind: Kind) -> anyhow::Result<PathBuf> {
-        let here = std::env::current_dir().context("cannot tell the current directory")?;
-        let target = match std::env::var_os("CARGO_TARGET_DIR") {
-            Some(directory) => here.join(directory),
-            None => {
-                here.ancestors().find(|at| at.join("Cargo.lock").is_file()).unwrap_or(&here).join("target")
-            }
-        };
-        let candidates = [target.clone(), target.join("debian")]
-            .map(|directory| directory.join("thumbv7em-none-eabihf/firmware").join(kind.name()));
-        let built = |path: &PathBuf| fs::metadata(path).and_then(|metadata| metadata.modified()).ok();
-        let newest = candidates.iter().filter_map(|path| Some((built(path)?, path))).max();
-        let Some((_, path)) = newest else {
-            bail!("there is no image at {}; build one with {BUILD_HINT}", candidates[0].display());
-        };
-        Ok(path.clone())
-    }
-
-    fn read(path: &Path) -> anyhow::Result<Vec<u8>> {
-        let about = || format!("cannot read the image {}", path.display());
-        let metadata = fs::metadata(path).with_context(about)?;
-        if !metadata.is_file() || metadata.len() > LARGEST_FILE_BYTES {
-            bail!("{} is no image of a microcontroller; give the ELF file that cargo links", path.display());
-        }
-        fs::read(path).with_context(about)
-    }
-
-    /// What the firmware must have for its logs to be followed.
-    fn follower(firmware: &Firmware<'_>, file: &[u8]) -> anyhow::Result<(u64, Logs)> {
-        let logs = Logs::parse(file)?;
-        let control_block = firmware.rtt_control_block.context(
-            "the image has no symbol _SEGGER_RTT, so that its logs cannot be found; do not strip it of symbols",
-        )?;
-        Ok((control_block, logs))
-    }
-
-    /// The hand of a file, with the hash that firmware built for it has.
-    fn expected_hand(path: &Path) -> anyhow::Result<ExpectedHand> {
-        let text = path.to_str().context("the path after --hand is not UTF-8")?;
-        let model = HandModel::load(text)?;
-        Ok(ExpectedHand { hash: model.hash(), name: model.name })
-    }
-
-    fn report<'a>(
-        path: &Path,
-        chip: &'a Chip,
-        firmware: &'a Firmware<'_>,
-        footprint: &Footprint,
-        hand_checked: bool,
-    ) -> Report<'a> {
-        let image = &firmware.image;
-        Report {
-            image: path.display().to_string(),
-            chip: chip.name(),
-            kind: image.kind,
-            hand: image.hand,
-            hand_hash: format!("{:08x}", image.hand_hash),
-            hand_checked,
-            interface_version: image.interface_version,
-            firmware_version: image.firmware_version,
-            build_hash: format!("{:08x}", image.build_hash),
-            joint_count: image.joint_count,
-            fingertip_count: image.fingertip_count,
-            period_us: image.period_us,
-            flash: Use { used_bytes: footprint.flash_used_bytes, available_bytes: footprint.flash_bytes },
-            ram: Use { used_bytes: footprint.ram_used_bytes, available_bytes: footprint.ram_bytes },
-            stack_bytes: footprint.stack_bytes,
-            flashed: false,
-            verified: false,
-            brown_out: None,
-        }
-    }
-
-    fn print(report: &Report<'_>, json: bool) -> anyhow::Result<Outcome> {
-        let text = if json { serde_json::to_string(report)? + "\n" } else { describe_report(report) };
-        io::stdout().lock().write_all(text.as_bytes()).context("cannot print the result")?;
-        Ok(Outcome::Shown)
-    }
-
-    /// The report as a table.
-    fn describe_report(report: &Report<'_>) -> String {
-        let kib = |bytes: u64| format!("{:.1} KiB", bytes as f64 / 1024.0);
-        let share = |share: &Use| {
-            let percent = 100.0 * share.used_bytes as f64 / share.available_bytes as f64;
-            format!("{} of {} ({percent:.1} %)", kib(share.used_bytes), kib(share.available_bytes))
-        };
-        let hand = match report.hand_checked {
-            true => "as in --hand",
-            false => "not compared; --hand FILE does",
-        };
-        let state = match (report.flashed, report.verified) {
-            (false, _) => "checked only",
-            (true, true) => "flashed, verified, started",
-            (true, false) => "flashed, not verified, started",
-        };
-        let lines = [
-            ("image", report.image.clone()),
-            ("hand", format!("{} ({}, {hand})", report.hand, report.hand_hash)),
-            (
-                "firmware",
-                format!(
-                    "{} ({}), interface {}",
-                    report.firmware_version, report.build_hash, report.interface_version
-                ),
+/// The report as a table.
+fn describe_report(report: &Report<'_>) -> String {
+    let kib = |bytes: u64| format!("{:.1} KiB", bytes as f64 / 1024.0);
+    let share = |share: &Use| {
+        let percent = 100.0 * share.used_bytes as f64 / share.available_bytes as f64;
+        format!("{} of {} ({percent:.1} %)", kib(share.used_bytes), kib(share.available_bytes))
+    };
+    let hand = match report.hand_checked {
+        true => "as in --hand",
+        false => "not compared; --hand FILE does",
+    };
+    let state = match (report.flashed, report.verified) {
+        (false, _) => "checked only",
+        (true, true) => "flashed, verified, started",
+        (true, false) => "flashed, not verified, started",
+    };
+    let lines = [
+        ("image", report.image.clone()),
+        ("hand", format!("{} ({}, {hand})", report.hand, report.hand_hash)),
+        (
+            "firmware",
+            format!(
+                "{} ({}), interface {}",
+                report.firmware_version, report.build_hash, report.interface_version
             ),
-            (
-                "controls",
-                format!(
-                    "{} joints, {} fingertips, every {} us",
-                    report.joint_count, report.fingertip_count, report.period_us
-                ),
+        ),
+        (
+            "controls",
+            format!(
+                "{} joints, {} fingertips, every {} us",
+                report.joint_count, report.fingertip_count, report.period_us
             ),
-            ("chip", report.chip.to_owned()),
-            ("flash", share(&report.flash)),
-            ("RAM, static", share(&report.ram)),
-            ("RAM for the stack", kib(report.stack_bytes)),
-            ("state", state.to_owned()),
-        ];
-        let brown_out = report
-            .brown_out
-            .iter()
-            .map(|[before, now]| ("brown-out reset", format!("{now}, {before} before")));
-        lines.into_iter().chain(brown_out).map(|(name, value)| format!("{name:<22}{value}\n")).collect()
+        ),
+        ("chip", report.chip.to_owned()),
+        ("flash", share(&report.flash)),
+        ("RAM, static", share(&report.ram)),
+        ("RAM for the stack", kib(report.stack_bytes)),
+        ("state", state.to_owned()),
+    ];
+    let brown_out =
+        report.brown_out.iter().map(|[before, now]| ("brown-out reset", format!("{now}, {before} before")));
+    lines.into_iter().chain(brown_out).map(|(name, value)| format!("{name:<22}{value}\n")).collect()
+}
+
+/// One bar for one phase after the other; hidden where stderr is no terminal.
+struct Bars(ProgressBar);
+
+impl Bars {
+    fn new() -> Self {
+        let style = "{msg:<9} {bar:40} {percent:>3} %  {bytes} of {total_bytes}";
+        let style = ProgressStyle::with_template(style).unwrap_or_else(|_| ProgressStyle::default_bar());
+        Self(ProgressBar::new(0).with_style(style))
     }
 
-    /// One bar for one phase after the other; hidden where stderr is no terminal.
-    struct Bars(ProgressBar);
-
-    impl Bars {
-        fn new() -> Self {
-            let style = "{msg:<9} {bar:40} {percent:>3} %  {bytes} of {total_bytes}";
-            let style = ProgressStyle::with_template(style).unwrap_or_else(|_| ProgressStyle::default_bar());
-            Self(ProgressBar::new(0).with_style(style))
-        }
-
-        fn show(&self, progress: Progress) {
-            self.0.set_message(match progress.phase {
-                Phase::Erase => "erasing",
-                Phase::Program => "writing",
-                Phase::Verify => "verifying",
-            });
-            self.0.set_length(progress.total_bytes);
-            self.0.set_position(progress.done_bytes);
-        }
+    fn show(&self, progress: Progress) {
+        self.0.set_message(match progress.phase {
+            Phase::Erase => "erasing",
+            Phase::Program => "writing",
+            Phase::Verify => "verifying",
+        });
+        self.0.set_length(progress.total_bytes);
+        self.0.set_position(progress.done_bytes);
     }
+}
 
-    /// A flag that Ctrl-C sets.
-    fn stop_at_interrupt() -> anyhow::Result<Arc<AtomicBool>> {
-        let stop = Arc::new(AtomicBool::new(false));
-        let handle = Arc::clone(&stop);
-        ctrlc::set_handler(move || handle.store(true, Ordering::Relaxed))
-            .context("cannot wait for Ctrl-C")?;
-        Ok(stop)
-    }
+/// A flag that Ctrl-C sets.
+fn stop_at_interrupt() -> anyhow::Result<Arc<AtomicBool>> {
+    let stop = Arc::new(AtomicBool::new(false));
+    let handle = Arc::clone(&stop);
+    ctrlc::set_handler(move || handle.store(true, Ordering::Relaxed)).context("cannot wait for Ctrl-C")?;
+    Ok(stop)
+}
 
-    fn show(event: Event) -> io::Result<()> {
-        match event {
-            Event::Line(line) => writeln!(io::stdout().lock(), "{} {line}", time_of_day()),
-            Event::Note(text) => {
-                eprintln!("blindgrasp: {} {text}", time_of_day());
-                Ok(())
-            }
+fn show(event: Event) -> io::Result<()> {
+    match event {
+        Event::Line(line) => writeln!(io::stdout().lock(), "{} {line}", time_of_day()),
+        Event::Note(text) => {
+            eprintln!("blindgrasp: {} {text}", time_of_day());
+            Ok(())
         }
     }
+}
 
-    /// Of this host, UTC.
-    fn time_of_day() -> String {
-        let now = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
-        let (s, ms) = (now.as_secs() % 86_400, now.subsec_millis());
-        format!("{:02}:{:02}:{:02}.{ms:03}", s / 3600, s / 60 % 60, s % 60)
-    }
+/// Of this host, UTC.
+fn time_of_day() -> String {
+    let now = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
+    let (s, ms) = (now.as_secs() % 86_400, now.subsec_millis());
+    format!("{:02}:{:02}:{:02}.{ms:03}", s / 3600, s / 60 % 60, s % 60)
 }

@@ -2,11 +2,15 @@
 
 pub(crate) mod console;
 pub(crate) mod export;
+#[cfg(feature = "probe")]
 pub(crate) mod flash;
 pub(crate) mod hand;
+#[cfg(feature = "monitor")]
 pub(crate) mod monitor;
+mod not_built;
 pub(crate) mod object;
 mod output;
+#[cfg(feature = "paper")]
 pub(crate) mod paper;
 pub(crate) mod pil;
 mod ports;
@@ -17,7 +21,11 @@ pub(crate) mod scene;
 #[cfg(unix)]
 pub(crate) mod serve;
 pub(crate) mod sim;
+#[cfg(feature = "sweep")]
 pub(crate) mod sweep;
+
+#[allow(unused_imports)]
+pub(crate) use not_built::*;
 
 /// How a command ended that was not misused.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

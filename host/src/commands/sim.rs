@@ -118,6 +118,12 @@ fn write_files(directory: &RunDir, scene: &Scene, run: &Run) -> anyhow::Result<(
         samples: &run.samples,
     };
     view::write(directory.path(), &report)?;
+    #[cfg(feature = "plots")]
+    blindgrasp::plots::write(directory.path(), &report)?;
+    #[cfg(not(feature = "plots"))]
+    eprintln!(
+        "blindgrasp: no plots: they take `cargo run --release --features plots --` and the same arguments"
+    );
     Ok(())
 }
 

@@ -62,13 +62,14 @@ impl Output {
     /// Chooses a file by its path, which says what it is.
     ///
     /// # Errors
-    /// It ends neither in `.parquet` nor in `.csv`.
+    /// It ends neither in `.parquet` nor in `.csv`, or the format is not built in.
     pub fn choose(path: &Path) -> Result<Self, OutputError> {
         let format = match path.extension().and_then(|ending| ending.to_str()) {
             Some("parquet") => Format::Parquet,
             Some("csv") => Format::Csv,
             _ => return Err(OutputError::Ending { path: path.to_owned() }),
         };
+        format.check().map_err(|source| OutputError::Table { path: path.to_owned(), source })?;
         Ok(Self { path: path.to_owned(), format })
     }
 

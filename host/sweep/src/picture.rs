@@ -3,8 +3,8 @@
 use super::axis::{Axis, Scale};
 use super::plan::Plan;
 use super::run::{Outcome, Row};
+use blindgrasp_plots::sweep::{Curve, Dot, Map, Mark, Spread, Variable};
 use blindgrasp_view::Files;
-use blindgrasp_view::sweep::{Curve, Dot, Map, Mark, Spread, Variable};
 
 /// Listed numbers that are further apart than this lie by their logarithms.
 const MOST_LINEAR: f64 = 50.0;

@@ -4,20 +4,23 @@ use super::palette::{Rgb, WHITE};
 
 /// A bitmap, eight bits a channel, rows from the top.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Canvas {
-    pub(super) width: usize,
-    pub(super) height: usize,
-    pub(super) pixels: Vec<Rgb>,
+pub struct Canvas {
+    /// Pixels from left to right.
+    pub width: usize,
+    /// Pixels from top to bottom.
+    pub height: usize,
+    /// Rows from the top, each from the left.
+    pub pixels: Vec<Rgb>,
 }
 
 impl Canvas {
     /// A white canvas.
-    pub(super) fn new(width: usize, height: usize) -> Self {
+    pub fn new(width: usize, height: usize) -> Self {
         Self { width, height, pixels: vec![WHITE; width * height] }
     }
 
     /// Lays `colour` over one pixel; `alpha` from 0 to 1. Nothing happens outside.
-    pub(super) fn blend(&mut self, x: i32, y: i32, colour: Rgb, alpha: f32) {
+    pub fn blend(&mut self, x: i32, y: i32, colour: Rgb, alpha: f32) {
         let (Ok(x), Ok(y)) = (usize::try_from(x), usize::try_from(y)) else { return };
         if x >= self.width || y >= self.height {
             return;
@@ -31,7 +34,7 @@ impl Canvas {
     }
 
     /// A line through `points`, `width` pixels wide, with round joints and ends. Where it crosses itself it is no darker.
-    pub(super) fn stroke(&mut self, points: &[(f32, f32)], width: f32, colour: Rgb, alpha: f32) {
+    pub fn stroke(&mut self, points: &[(f32, f32)], width: f32, colour: Rgb, alpha: f32) {
         let reach = width / 2.0 + 1.0;
         let bounds = |of: fn(&(f32, f32)) -> f32, size: usize| {
             let low = points.iter().map(of).fold(f32::INFINITY, f32::min) - reach;
@@ -69,7 +72,7 @@ impl Canvas {
     }
 
     /// A plain rectangle between two corners, the lower right one included, as far as it is on the canvas.
-    pub(super) fn fill(&mut self, from: (i32, i32), to: (i32, i32), colour: Rgb) {
+    pub fn fill(&mut self, from: (i32, i32), to: (i32, i32), colour: Rgb) {
         let clamp = |v: i32, size: usize| usize::try_from(v).unwrap_or(0).min(size);
         let (left, right) = (clamp(from.0, self.width), clamp(to.0.saturating_add(1), self.width));
         let (top, bottom) = (clamp(from.1, self.height), clamp(to.1.saturating_add(1), self.height));
@@ -81,7 +84,7 @@ impl Canvas {
     }
 
     /// Lays another canvas over this one, its upper left corner at `at` (column, row), as far as it fits.
-    pub(super) fn paste(&mut self, other: &Self, at: (usize, usize)) {
+    pub fn paste(&mut self, other: &Self, at: (usize, usize)) {
         let columns = other.width.min(self.width.saturating_sub(at.0));
         let rows = self.pixels.chunks_exact_mut(self.width.max(1)).skip(at.1);
         for (row, source) in rows.zip(other.pixels.chunks_exact(other.width.max(1))) {
@@ -92,7 +95,7 @@ impl Canvas {
     }
 
     /// The canvas at `1 / factor` of its size, each pixel the mean of `factor * factor`.
-    pub(super) fn reduced(&self, factor: usize) -> Self {
+    pub fn reduced(&self, factor: usize) -> Self {
         if factor <= 1 {
             return self.clone();
         }
@@ -117,7 +120,7 @@ impl Canvas {
     }
 
     /// The canvas as a PNG file.
-    pub(super) fn png(&self) -> Result<Vec<u8>, png::EncodingError> {
+    pub fn png(&self) -> Result<Vec<u8>, png::EncodingError> {
         let mut bytes = Vec::new();
         let mut encoder = png::Encoder::new(&mut bytes, self.width as u32, self.height as u32);
         encoder.set_color(png::ColorType::Rgb);

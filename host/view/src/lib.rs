@@ -16,39 +16,28 @@
 //! `text` are the bitmap under all of it. `sketch` draws a hand or an object alone, as SVG: [`hand_svg`], [`object_svg`].
 
 mod animation;
-mod axes;
-mod backend;
 mod camera;
-mod canvas;
-mod chart;
-mod drawing;
-mod figure;
+pub mod canvas;
 #[cfg(test)]
 mod fixture;
 mod input;
-mod legend;
 mod mesh;
-mod palette;
+pub mod palette;
 mod palm;
-mod pens;
 mod picture;
-pub mod plots;
 mod quantise;
 mod raster;
 mod scene3d;
-mod series;
 mod skeleton;
 mod sketch;
 mod strip;
-pub mod sweep;
 #[cfg(test)]
 mod tests;
-mod text;
+pub mod text;
+pub mod units;
 
-pub use figure::{Along, Axis, Figure, Line, Panel};
 pub use input::Report;
 pub use palette::{Rgb, of as colour};
-pub use pens::Dash;
 pub use sketch::{hand_svg, object_svg};
 pub use strip::Strip;
 
@@ -87,33 +76,42 @@ pub enum ReportError {
     },
 }
 
-/// Draws every figure of a run and writes it to `dir`, which is created if need be. Files of the same names are
-/// replaced.
+/// Writes a drawn file to `dir`; a file of the same name is replaced.
 ///
-/// A run without samples gives empty plots and a picture of the hand with all joints at zero.
+/// # Errors
+/// It could not be drawn, or can't be written.
+pub fn save(dir: &Path, name: &str, drawn: Result<Vec<u8>, String>) -> Result<(), ReportError> {
+    let path = dir.join(name);
+    match drawn {
+        Ok(bytes) => fs::write(&path, bytes).map_err(|cause| ReportError::Write { path, cause }),
+        Err(reason) => Err(ReportError::Draw { path, reason }),
+    }
+}
+
+/// Makes the directory of a report, if need be.
+///
+/// # Errors
+/// What the file system says.
+pub fn create(dir: &Path) -> Result<(), ReportError> {
+    fs::create_dir_all(dir).map_err(|cause| ReportError::Directory { path: dir.to_owned(), cause })
+}
+
+/// Draws the pictures and the animation of a run and writes them to `dir`, which is created if need be. Files of the same
+/// names are replaced.
+///
+/// A run without samples gives a picture of the hand with all joints at zero.
 ///
 /// # Errors
 /// The first file that could not be drawn or written; those before it are there.
 pub fn write(dir: &Path, report: &Report<'_>) -> Result<(), ReportError> {
-    fs::create_dir_all(dir).map_err(|cause| ReportError::Directory { path: dir.to_owned(), cause })?;
-    let save = |name: String, drawn: Result<Vec<u8>, String>| {
-        let path = dir.join(name);
-        match drawn {
-            Ok(bytes) => fs::write(&path, bytes).map_err(|cause| ReportError::Write { path, cause }),
-            Err(reason) => Err(ReportError::Draw { path, reason }),
-        }
-    };
-    for plot in plots::all(report.title, report.hand, report.joint_names, report.samples) {
-        for (ending, drawn) in ["png", "svg"].into_iter().zip(plot.figure.files()) {
-            save(format!("{}.{ending}", plot.name), drawn)?;
-        }
-    }
+    create(dir)?;
     let stage = scene3d::Stage::new(report);
     for moment in [picture::Moment::Start, picture::Moment::End] {
         save(
-            format!("{}.png", moment.file_name()),
+            dir,
+            &format!("{}.png", moment.file_name()),
             picture::draw(report, &stage, moment).png().map_err(|e| e.to_string()),
         )?;
     }
-    save("grasp.gif".to_owned(), animation::draw(report, &stage))
+    save(dir, "grasp.gif", animation::draw(report, &stage))
 }

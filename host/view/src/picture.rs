@@ -6,7 +6,7 @@ use super::input::Report;
 use super::palette::{self, FAINT_INK, INK, Rgb};
 use super::scene3d::{FORCE, Stage};
 use super::text::{self, Anchor, Turn};
-use super::{raster, series};
+use super::{raster, units};
 use blindgrasp_sim::sample::Sample;
 
 pub(super) const WIDTH: usize = 960;
@@ -96,7 +96,7 @@ pub(super) fn scale_bar(canvas: &mut Canvas, left: i32, pixels_per_unit: f64, un
             canvas.stroke(&[(end, row - 4.0), (end, row + 4.0)], 2.0, FAINT_INK, 1.0);
         }
     }
-    let (prefix, factor) = series::prefix(value);
+    let (prefix, factor) = units::prefix(value);
     // Multiples of 1, 2 and 5 print exactly once the prefix has brought them near one.
     let label = format!("{} {prefix}{unit}", (value * factor * 1e6).round() / 1e6);
     words(canvas, &label, (to as i32 + 10, y + 5), 14.0, Anchor::Left, FAINT_INK);

@@ -17,7 +17,7 @@ pub use object::object_svg;
 use super::camera::Camera;
 use super::palette::{BLUE, FAINT_INK, GREEN, Rgb, VERMILLION};
 use super::picture::round_below;
-use super::series;
+use super::units;
 use nalgebra::Vector3;
 use svg::{Anchor, Svg};
 
@@ -48,7 +48,7 @@ fn scale_bar(svg: &mut Svg, index: usize, camera: &Camera) {
     let (left, y) = (MARGIN + index as f64 * (WIDTH - 2.0 * MARGIN - VIEW) + 4.0, TOP + VIEW - 12.0);
     let right = left + value * camera.pixels_per_m;
     svg.line(&[[left, y - 4.0], [left, y], [right, y], [right, y - 4.0]], 1.5, FAINT_INK);
-    let (prefix, factor) = series::prefix(value);
+    let (prefix, factor) = units::prefix(value);
     // Multiples of 1, 2 and 5 print exactly once the prefix has brought them near one.
     let label = format!("{} {prefix}m", (value * factor * 1e6).round() / 1e6);
     svg.text([right + 8.0, y + 1.0], &label, 12.0, FAINT_INK, Anchor::Start);

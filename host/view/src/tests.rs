@@ -1,7 +1,6 @@
 //! Every file of a report: there, whole, the same twice, and an error where it can't be.
 
-use super::drawing::Drawing as _;
-use super::{Report, ReportError, animation, fixture, picture, plots, write};
+use super::{Report, ReportError, animation, fixture, picture, write};
 use blindgrasp_sim::sample::Sample;
 use nalgebra::{Matrix3, Vector3};
 use std::collections::BTreeMap;
@@ -35,19 +34,7 @@ fn files(dir: &Path) -> BTreeMap<String, Vec<u8>> {
     entries.map(|e| (e.file_name().into_string().unwrap(), fs::read(e.path()).unwrap())).collect()
 }
 
-const FILES: [&str; 11] = [
-    "contact-forces.png",
-    "contact-forces.svg",
-    "grasp-end.png",
-    "grasp-start.png",
-    "grasp.gif",
-    "joint-velocities.png",
-    "joint-velocities.svg",
-    "object-velocities.png",
-    "object-velocities.svg",
-    "residuals.png",
-    "residuals.svg",
-];
+const FILES: [&str; 3] = ["grasp-end.png", "grasp-start.png", "grasp.gif"];
 
 /// Size and pixels of a PNG file.
 fn decoded(file: &[u8]) -> ((u32, u32), Vec<u8>) {
@@ -84,11 +71,7 @@ fn a_report_has_every_file_whole_and_the_same_bytes_twice() {
     assert!(written == files(&second.0), "the same run gives the same bytes");
 
     for (name, file) in &written {
-        if name.ends_with(".svg") {
-            let text = std::str::from_utf8(file).unwrap();
-            assert!(text.starts_with("<svg width=\"960\"") && text.trim_end().ends_with("</svg>"), "{name}");
-            assert!(!text.contains("NaN"), "{name}");
-        } else if name.ends_with(".png") {
+        if name.ends_with(".png") {
             let ((width, height), pixels) = decoded(file);
             assert_eq!(width, 960, "{name}");
             assert!(height >= 500, "{name}");
@@ -97,20 +80,10 @@ fn a_report_has_every_file_whole_and_the_same_bytes_twice() {
     }
     let (size, _) = decoded(&written["grasp-end.png"]);
     assert_eq!(size, (picture::WIDTH as u32, picture::HEIGHT as u32));
-    for legend in ["abduction 2", "joint velocity, rad/s", "time, s"] {
-        assert!(String::from_utf8_lossy(&written["joint-velocities.svg"]).contains(legend), "{legend}");
-    }
 
     let delays = delays(&written["grasp.gif"]);
     assert_eq!(delays.len(), animation::Schedule::new(&samples).times.len());
     assert!(written["grasp.gif"].len() < 2_000_000);
-}
-
-/// The plots as text: cheap to draw, and by the same code as the bitmaps.
-fn plots_of(samples: &[Sample]) -> Vec<String> {
-    let (hand, names) = (fixture::hand(), fixture::joint_names());
-    let drawn = plots::all("prism", &hand, &names, samples).map(|plot| plot.figure.svg().unwrap());
-    drawn.into_iter().map(|file| String::from_utf8(file).unwrap()).collect()
 }
 
 #[test]
@@ -120,24 +93,6 @@ fn a_run_without_samples_is_drawn() {
     let written = files(&scratch.0);
     assert_eq!(written.len(), FILES.len());
     assert_eq!(delays(&written["grasp.gif"]).len(), 1);
-}
-
-#[test]
-fn plots_show_single_samples_and_say_where_there_is_nothing() {
-    for plot in plots_of(&fixture::samples(1)) {
-        assert!(plot.contains("<circle"), "a single sample is a dot");
-    }
-    let mut samples = fixture::samples(40);
-    for sample in &mut samples {
-        sample.speeds_rad_s.fill(0.0);
-        sample.velocity_m_s.fill(0.0);
-        for contact in &mut sample.contacts {
-            contact.force_residual_n.fill(0.0);
-            contact.moment_residual_nm.fill(f64::NAN);
-        }
-    }
-    let [_, _, _, residuals] = plots_of(&samples).try_into().unwrap();
-    assert_eq!(residuals.matches("no values above zero").count(), 2);
 }
 
 #[test]
@@ -179,7 +134,7 @@ fn what_cannot_be_written_is_named() {
     assert!(error.to_string().contains("below: "), "{error}");
 
     // A directory where a file should go.
-    let blocked = scratch.0.join("joint-velocities.svg");
+    let blocked = scratch.0.join("grasp-start.png");
     fs::create_dir_all(&blocked).unwrap();
     let error = report_of(&[], &scratch.0).unwrap_err();
     assert!(matches!(&error, ReportError::Write { path, .. } if *path == blocked), "{error}");
@@ -190,8 +145,8 @@ fn what_cannot_be_written_is_named() {
 fn a_full_disk_is_an_error() {
     let scratch = Scratch::new("full");
     fs::create_dir_all(&scratch.0).unwrap();
-    std::os::unix::fs::symlink("/dev/full", scratch.0.join("residuals.svg")).unwrap();
+    std::os::unix::fs::symlink("/dev/full", scratch.0.join("grasp-end.png")).unwrap();
     let error = report_of(&[], &scratch.0).unwrap_err();
     let ReportError::Write { path, cause } = &error else { panic!("{error}") };
-    assert!(path.ends_with("residuals.svg") && cause.kind() == std::io::ErrorKind::StorageFull, "{error}");
+    assert!(path.ends_with("grasp-end.png") && cause.kind() == std::io::ErrorKind::StorageFull, "{error}");
 }

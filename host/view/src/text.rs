@@ -6,19 +6,23 @@ use ab_glyph::{Font, FontRef, Glyph, PxScale, ScaleFont, point};
 use std::sync::OnceLock;
 
 /// Plotters' text size in pixels per em, as in its SVG files.
-pub(super) const SIZE_PER_EM: f64 = 1.24;
+pub const SIZE_PER_EM: f64 = 1.24;
 
 /// Which point of the text sits at the given position.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum Anchor {
+pub enum Anchor {
+    /// Its left end.
     Left,
+    /// Its middle.
     Centre,
+    /// Its right end.
     Right,
 }
 
 /// How the text is turned.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum Turn {
+pub enum Turn {
+    /// Not at all.
     None,
     /// A quarter turn: reads from the bottom to the top.
     Up,
@@ -28,19 +32,6 @@ pub(super) enum Turn {
 fn font() -> Option<&'static FontRef<'static>> {
     static FONT: OnceLock<Option<FontRef<'static>>> = OnceLock::new();
     FONT.get_or_init(|| FontRef::try_from_slice(dejavu::sans::regular()).ok()).as_ref()
-}
-
-/// Lets Plotters measure text: with this font under the name that its SVG files ask the viewer for.
-pub(super) fn register_with_plotters() {
-    static ONCE: OnceLock<()> = OnceLock::new();
-    ONCE.get_or_init(|| {
-        // Fails only for a broken font, and then drawing reports that there is none.
-        let _ = plotters::style::register_font(
-            "sans-serif",
-            plotters::style::FontStyle::Normal,
-            dejavu::sans::regular(),
-        );
-    });
 }
 
 /// Glyphs of one line from (0, 0) on the baseline, and its width.
@@ -60,13 +51,13 @@ fn set(font: &FontRef<'static>, words: &str, em: f32) -> (Vec<Glyph>, f32) {
 }
 
 /// Width of a line of text, pixels.
-pub(super) fn width(words: &str, em: f32) -> f32 {
+pub fn width(words: &str, em: f32) -> f32 {
     font().map_or(0.0, |font| set(font, words, em).1)
 }
 
 /// Draws a line of text whose baseline lies `below` pixels under `at`; `em` is the size in pixels.
 #[expect(clippy::too_many_arguments, reason = "a text has this many properties, and each is used once")]
-pub(super) fn draw(
+pub fn draw(
     canvas: &mut Canvas,
     words: &str,
     at: (i32, i32),
@@ -99,7 +90,7 @@ pub(super) fn draw(
 }
 
 /// At most `length` letters, the last one an ellipsis where some are missing.
-pub(super) fn shortened(words: &str, length: usize) -> String {
+pub fn shortened(words: &str, length: usize) -> String {
     if words.chars().count() <= length {
         return words.to_owned();
     }

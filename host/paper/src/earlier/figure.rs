@@ -3,7 +3,7 @@
 use super::{Comparison, Final, GAINS, PATHS};
 use crate::figures::{Drawing, Drawn};
 use crate::laws::Law::{self, Attitudes, Integral};
-use blindgrasp_view::{Along, Axis, Figure, Line, Panel};
+use blindgrasp_plots::{Along, Axis, Figure, Line, Panel};
 
 const TITLE: &str = "Where the cube comes to rest, and with which force, by the way it took";
 

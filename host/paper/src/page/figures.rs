@@ -4,7 +4,8 @@ use super::section as section_with;
 use crate::figures::{Drawing, Drawn};
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
-use blindgrasp_view::{Axis, Dash, Figure, Line, Panel, Strip};
+use blindgrasp_plots::{Axis, Dash, Figure, Line, Panel};
+use blindgrasp_view::Strip;
 use maud::{Markup, PreEscaped, html};
 
 pub(super) fn section(figures: &[Drawn]) -> Result<Markup, String> {

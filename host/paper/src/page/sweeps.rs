@@ -4,9 +4,9 @@ use super::figures::described;
 use super::section as section_with;
 use crate::claim::number;
 use crate::sensitivity::{Limits, Sweep};
+use blindgrasp_plots::sweep::{Curve, Map};
 use blindgrasp_sim::summary::Summary;
 use blindgrasp_sweep::{Edge, Picture, Row, Value, picture};
-use blindgrasp_view::sweep::{Curve, Map};
 use maud::{Markup, PreEscaped, html};
 
 pub(super) fn section(sweeps: &[Sweep]) -> Result<Markup, String> {

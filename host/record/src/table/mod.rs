@@ -1,6 +1,7 @@
 //! Tables in files, of whatever a [`Layout`] makes rows of: CSV, and Parquet with units and more in its metadata.
 
 mod csv;
+#[cfg(feature = "parquet")]
 mod parquet;
 
 use std::io::{self, Write};
@@ -12,6 +13,20 @@ pub enum Format {
     Csv,
     /// Parquet.
     Parquet,
+}
+
+impl Format {
+    /// Refuses a format that is not built in, before a file is made for it.
+    ///
+    /// # Errors
+    /// [`TableError::NotBuilt`], which says how to get it.
+    pub fn check(self) -> Result<(), TableError> {
+        if self == Self::Parquet && cfg!(not(feature = "parquet")) {
+            Err(TableError::NotBuilt)
+        } else {
+            Ok(())
+        }
+    }
 }
 
 /// What a column holds.
@@ -97,6 +112,11 @@ pub trait Table<R> {
 /// Why a table can't be written.
 #[derive(Debug, thiserror::Error)]
 pub enum TableError {
+    /// Parquet is a feature, which is off.
+    #[error(
+        "this build has no Parquet; build it in: `cargo run --release --features parquet --` and the same arguments"
+    )]
+    NotBuilt,
     /// The file system said no.
     #[error("cannot write the table: {0}")]
     Write(#[from] io::Error),
@@ -104,6 +124,7 @@ pub enum TableError {
     #[error("cannot write the table: {0}")]
     Csv(#[from] ::csv::Error),
     /// The file system said no, or Parquet can't express it.
+    #[cfg(feature = "parquet")]
     #[error("cannot write the table: {0}")]
     Parquet(#[from] ::parquet::errors::ParquetError),
 }
@@ -115,6 +136,8 @@ impl TableError {
         match self {
             Self::Write(error) => is_it(error),
             Self::Csv(error) => matches!(error.kind(), ::csv::ErrorKind::Io(error) if is_it(error)),
+            Self::NotBuilt => false,
+            #[cfg(feature = "parquet")]
             Self::Parquet(error) => {
                 std::error::Error::source(error).and_then(|source| source.downcast_ref()).is_some_and(is_it)
             }
@@ -133,6 +156,9 @@ pub fn create<'a, L: Layout + 'a>(
 ) -> Result<Box<dyn Table<L::Row> + 'a>, TableError> {
     Ok(match format {
         Format::Csv => Box::new(csv::CsvTable::new(to, layout)?),
+        #[cfg(feature = "parquet")]
         Format::Parquet => Box::new(parquet::ParquetTable::new(to, layout)?),
+        #[cfg(not(feature = "parquet"))]
+        Format::Parquet => return Err(TableError::NotBuilt),
     })
 }

@@ -1,6 +1,6 @@
 //! A range of colours for a range of numbers.
 
-use super::super::palette::{BLUE, Rgb, VERMILLION, mix};
+use blindgrasp_view::palette::{BLUE, Rgb, VERMILLION, mix};
 use std::ops::Range;
 
 /// Colours from one end to the other, by way of the middle.

@@ -1,9 +1,9 @@
 //! The legend at the side of a panel.
 
 use super::figure::Panel;
-use super::palette::INK;
 use super::pens::{LABEL_SIZE, letters, pen, reason};
-use super::text;
+use blindgrasp_view::palette::INK;
+use blindgrasp_view::text;
 use plotters::coord::Shift;
 use plotters::prelude::{DrawingArea, DrawingBackend, PathElement, Text};
 use plotters::style::text_anchor::{HPos, Pos, VPos};

@@ -2,13 +2,13 @@
 
 use super::super::axes::{Chart, Frame, Ruler};
 use super::super::drawing::{self, Drawing, PANEL_WIDTH, TITLE_HEIGHT, WIDTH};
-use super::super::palette::{FAINT_INK, INK, Rgb};
 use super::super::pens::{ink, reason};
 use super::Mark;
 use super::key::{self, Key};
 use super::ramp::Ramp;
 use super::variable::{Along, Variable, widest};
-use crate::Files;
+use blindgrasp_view::Files;
+use blindgrasp_view::palette::{FAINT_INK, INK, Rgb};
 use plotters::coord::Shift;
 use plotters::prelude::{DrawingArea, DrawingBackend, EmptyElement, PathElement, Rectangle};
 use std::ops::Range;

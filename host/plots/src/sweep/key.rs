@@ -1,9 +1,9 @@
 //! The key at the side of a picture: colours and what they mean.
 
-use super::super::palette::{FAINT_INK, INK};
 use super::super::pens::{LABEL_SIZE, ink, letters, reason};
 use super::super::series;
 use super::ramp::Ramp;
+use blindgrasp_view::palette::{FAINT_INK, INK};
 use plotters::coord::Shift;
 use plotters::prelude::{DrawingArea, DrawingBackend, PathElement, Rectangle, Text};
 use plotters::style::text_anchor::{HPos, Pos, VPos};

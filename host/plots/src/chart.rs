@@ -1,12 +1,12 @@
 //! Draws a figure of panels over time, or over something else.
 
-use super::Files;
 use super::axes::{Chart, Frame, Ruler};
 use super::drawing::{self, Drawing, PANEL_HEIGHT, PANEL_WIDTH, TITLE_HEIGHT, WIDTH};
 use super::figure::{Along, Axis, Figure, Line, Panel};
-use super::palette::FAINT_INK;
 use super::pens::{LABEL_SIZE, ink, letters, pen, reason};
 use super::{legend, series};
+use blindgrasp_view::Files;
+use blindgrasp_view::palette::FAINT_INK;
 use plotters::coord::Shift;
 use plotters::prelude::{Circle, DrawingArea, DrawingBackend, LineSeries, PathElement, Text};
 use std::ops::Range;
@@ -108,7 +108,7 @@ impl Figure {
         };
         let (range, ticks, prefix, factor) = match &panel.axis {
             Axis::Linear(range) => {
-                let (prefix, factor) = series::prefix(range.start.abs().max(range.end.abs()));
+                let (prefix, factor) = blindgrasp_view::units::prefix(range.start.abs().max(range.end.abs()));
                 let range = range.start * factor..range.end * factor;
                 let ticks = labelled(series::ticks(&range, 6), &series::label);
                 (range, ticks, prefix, factor)

@@ -1,8 +1,9 @@
 //! Pictures of sweeps: every field and mark where it belongs, and nothing beyond the edge.
 
-use super::super::{pens::LABEL_SIZE, text};
+use super::super::pens::LABEL_SIZE;
 use super::*;
-use crate::Files;
+use blindgrasp_view::Files;
+use blindgrasp_view::text;
 use std::collections::BTreeMap;
 
 fn svg(files: Files) -> String {

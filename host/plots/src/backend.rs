@@ -1,8 +1,8 @@
 //! Lets Plotters draw on a [`Canvas`]. Its own bitmap backend has neither round joints nor fractions of a pixel in text.
 
-use super::canvas::Canvas;
-use super::palette::Rgb;
-use super::text::{self, Anchor, Turn};
+use blindgrasp_view::canvas::Canvas;
+use blindgrasp_view::palette::Rgb;
+use blindgrasp_view::text::{self, Anchor, Turn};
 use plotters_backend::text_anchor::{HPos, VPos};
 use plotters_backend::{
     BackendColor, BackendCoord, BackendStyle, BackendTextStyle, DrawingBackend, DrawingErrorKind,

@@ -2,13 +2,13 @@
 
 use super::super::axes::{Chart, Frame, Ruler};
 use super::super::drawing::{self, Drawing, PANEL_HEIGHT as ALONE_HEIGHT, PANEL_WIDTH, TITLE_HEIGHT, WIDTH};
-use super::super::palette::{BLUE, FAINT_INK, Rgb, VERMILLION, WHITE, mix};
 use super::super::pens::{ink, pen, reason};
 use super::super::series;
 use super::Mark;
 use super::key::{self, Key};
 use super::variable::{Along, Spread, Variable, round_powers};
-use crate::Files;
+use blindgrasp_view::Files;
+use blindgrasp_view::palette::{BLUE, FAINT_INK, Rgb, VERMILLION, WHITE, mix};
 use plotters::coord::Shift;
 use plotters::prelude::{
     Circle, DrawingArea, DrawingBackend, EmptyElement, LineSeries, PathElement, Rectangle,

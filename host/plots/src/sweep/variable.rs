@@ -2,7 +2,8 @@
 
 use super::super::axes::Ruler;
 use super::super::pens::LABEL_SIZE;
-use super::super::{series, text};
+use super::super::series;
+use blindgrasp_view::text;
 use std::ops::Range;
 
 /// Between two labels, pixels.

@@ -1,10 +1,10 @@
 //! What every figure that Plotters draws has in common: a bitmap and an SVG file of the same picture, and its title.
 
 use super::backend::Pen;
-use super::canvas::Canvas;
-use super::palette::INK;
-use super::pens::{letters, reason};
-use super::text;
+use super::pens::{letters, reason, register_font};
+use blindgrasp_view::canvas::Canvas;
+use blindgrasp_view::palette::INK;
+use blindgrasp_view::text;
 use plotters::coord::Shift;
 use plotters::prelude::{DrawingArea, DrawingBackend, IntoDrawingArea, SVGBackend, Text, WHITE};
 use plotters::style::text_anchor::{HPos, Pos, VPos};
@@ -60,7 +60,7 @@ pub(super) trait Drawing {
 
 /// White paper.
 pub(super) fn paper<B: DrawingBackend>(root: &DrawingArea<B, Shift>) -> Result<(), String> {
-    text::register_with_plotters();
+    register_font();
     root.fill(&WHITE).map_err(reason)
 }
 

@@ -1,11 +1,11 @@
 //! What the figures show: joint velocities, object velocities, contact forces, residuals.
 
 use super::figure::{Along, Axis, Figure, Line, Panel};
-use super::palette::{BLACK, BLUE, VERMILLION};
 use super::pens::Dash;
 use super::series;
 use blindgrasp_body::Hand;
 use blindgrasp_sim::sample::{ContactSample, Sample};
+use blindgrasp_view::palette::{BLACK, BLUE, VERMILLION};
 use nalgebra::Vector3;
 
 /// One figure of a run and the name of its files, without the ending.

@@ -1,7 +1,7 @@
 //! Two axes with their labels and grid: the frame of a chart.
 
-use super::palette::{FAINT_INK, GRID, INK};
 use super::pens::{LABEL_SIZE, ink, letters, reason};
+use blindgrasp_view::palette::{FAINT_INK, GRID, INK};
 use plotters::coord::Shift;
 use plotters::coord::cartesian::Cartesian2d;
 use plotters::coord::ranged1d::{DefaultFormatting, KeyPointHint, Ranged};

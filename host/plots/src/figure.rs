@@ -1,8 +1,8 @@
 //! A figure: panels above one another over one axis, mostly time, each with its legend at its side.
 
-use super::palette::{self, Rgb};
 use super::pens::Dash;
 use super::series;
+use blindgrasp_view::palette::{self, Rgb};
 use std::ops::Range;
 
 /// One signal.

@@ -1,7 +1,7 @@
 //! The pens and letters of a figure, in pixels of the finished picture times a scale.
 
-use super::palette::Rgb;
 use super::series;
+use blindgrasp_view::palette::Rgb;
 use plotters::prelude::{FontDesc, FontFamily, FontStyle, RGBColor, ShapeStyle, TextStyle};
 use plotters::style::text_anchor::Pos;
 use plotters_backend::BackendColor;
@@ -65,4 +65,17 @@ pub(super) fn letters(size: i32, scale: i32, colour: Rgb) -> TextStyle<'static> 
 /// An error of Plotters in words.
 pub(super) fn reason(error: impl Display) -> String {
     error.to_string()
+}
+
+/// Lets Plotters measure text: with this font under the name that its SVG files ask the viewer for.
+pub(super) fn register_font() {
+    static ONCE: std::sync::OnceLock<()> = std::sync::OnceLock::new();
+    ONCE.get_or_init(|| {
+        // Fails only for a broken font, and then drawing reports that there is none.
+        let _ = plotters::style::register_font(
+            "sans-serif",
+            plotters::style::FontStyle::Normal,
+            dejavu::sans::regular(),
+        );
+    });
 }

@@ -182,16 +182,6 @@ pub(super) fn power_label(exponent: f64) -> String {
     format!("10{}", raised.collect::<String>())
 }
 
-/// The prefix for a unit in which `largest` reads well, and the factor that goes with it.
-pub(super) fn prefix(largest: f64) -> (&'static str, f64) {
-    match largest {
-        v if v > 0.0 && v < 1e-7 => ("n", 1e9),
-        v if v > 0.0 && v < 1e-4 => ("µ", 1e6),
-        v if v > 0.0 && v < 0.1 => ("m", 1e3),
-        _ => ("", 1.0),
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
