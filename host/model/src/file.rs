@@ -1,109 +1,126 @@
-//! What may stand in the files: scenes, hands, objects. Every key carries its unit; nothing else is allowed.
+//! The keys of files: scenes, hands, objects. Every key carries its unit; nothing else is allowed. The words of their
+//! documentation are those of `docs/scenes.md`.
 //!
 //! These structs are the effective configuration: what stays after references are followed, defaults filled in and
 //! `--set` applied. Tests build them in code and hand them to [`Scene::build`](super::Scene::build).
 
 mod control;
+mod key;
 mod object;
 mod push;
 mod safety;
 
 pub use control::Control;
+pub use key::{FileKey, ShapeKind};
 pub use object::{ObjectFile, ShapeFile};
 pub use push::PushFile;
 pub use safety::{Safety, SafetyKey};
 
+use key::keys;
 use serde::{Deserialize, Deserializer, Serialize, Serializer, de};
 use std::collections::BTreeMap;
 
 /// The version of the format that this program reads and writes.
 pub const SCHEMA: u32 = 1;
 
-/// A scene: a hand, an object, where they meet, and everything that a run depends on.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct SceneFile {
-    /// Version of the format; [`SCHEMA`].
-    pub schema: u32,
-    /// A word.
-    pub name: String,
-    /// A sentence or two.
-    #[serde(default)]
-    pub description: String,
-    /// Length of the run, s.
-    pub duration_s: f64,
-    /// Seed of the noise; does nothing while there is none.
-    #[serde(default)]
-    pub seed: u32,
-    /// The hand. In a file also a built-in name, or a path relative to that file.
-    pub hand: HandFile,
-    /// The object. In a file also a built-in name, or a path relative to that file.
-    pub object: ObjectFile,
-    /// Where the object is at the start.
-    pub pose: PoseFile,
-    /// Where the fingertips touch it: one for each fingertip, in the hand's order.
-    #[serde(rename = "contact")]
-    pub contacts: Vec<ContactFile>,
-    /// How the run begins.
-    #[serde(default)]
-    pub start: StartFile,
-    /// The controller.
-    pub control: Control,
-    /// The joint sensors.
-    #[serde(default)]
-    pub sensors: Sensors,
-    /// The motors and their amplifiers.
-    #[serde(default)]
-    pub actuators: Actuators,
-    /// The friction of the joints.
-    #[serde(default)]
-    pub friction: Friction,
-    /// The simulated world.
-    #[serde(default)]
-    pub plant: PlantSettings,
+keys! {
+    /// A scene: a hand, an object, where they meet, and everything that a run depends on.
+    #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+    #[serde(deny_unknown_fields)]
+    pub struct SceneFile {
+        /// Version of the format: 1.
+        pub schema: u32,
+        /// Name of the scene, a word.
+        pub name: String,
+        /// A sentence or two on it.
+        #[serde(default)]
+        pub description: String,
+        /// Length of the run, s; `--duration` sets it.
+        pub duration_s: f64,
+        /// Seed of the noise on the sensors; it does nothing while there is none.
+        #[serde(default)]
+        pub seed: u32,
+        /// The hand: the name of a built-in one, the path of its file relative to this one, or all of it as a table
+        /// (`hands.md` has its keys).
+        pub hand: HandFile,
+        /// The object: the name of a built-in one, the path of its file relative to this one, or all of it as a table (its
+        /// keys are below).
+        pub object: ObjectFile,
+        /// Position and attitude of the object at the start.
+        pub pose: PoseFile,
+        /// The points at which fingertips touch the object: one `[[contact]]` for each fingertip, in the hand's order.
+        #[serde(rename = "contact")]
+        pub contacts: Vec<ContactFile>,
+        /// Posture and indentation at the start.
+        #[serde(default)]
+        pub start: StartFile,
+        /// The controller.
+        pub control: Control,
+        /// The joint sensors.
+        #[serde(default)]
+        pub sensors: Sensors,
+        /// The motors and their amplifiers.
+        #[serde(default)]
+        pub actuators: Actuators,
+        /// Friction of the joints.
+        #[serde(default)]
+        pub friction: Friction,
+        /// The simulated world.
+        #[serde(default)]
+        pub plant: PlantSettings,
+    }
 }
 
-/// A position and an attitude in the base frame of the hand.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct PoseFile {
-    /// Of the object's centre of mass, m.
-    pub position_m: [f64; 3],
-    /// Roll, pitch and yaw about fixed x, y and z axes, in this order, rad.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub rotation_rpy_rad: Option<[f64; 3]>,
-    /// Instead of the angles: the unit quaternion w, x, y, z.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub quaternion_wxyz: Option<[f64; 4]>,
+keys! {
+    /// A position and an attitude in the base frame of the hand.
+    #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+    #[serde(deny_unknown_fields)]
+    pub struct PoseFile {
+        /// Position of the object's centre of mass, m.
+        pub position_m: [f64; 3],
+        /// Attitude of the object: roll, pitch and yaw about fixed x, y and z axes, in this order, rad; without it, 0.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        pub rotation_rpy_rad: Option<[f64; 3]>,
+        /// Attitude as a unit quaternion w, x, y, z, instead of the angles.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        pub quaternion_wxyz: Option<[f64; 4]>,
+    }
 }
 
-/// Where a fingertip touches the object. The object frame has the axes of the shape's description and its origin at the
-/// object's centre of mass.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct ContactFile {
-    /// Index of the face, from 0; without it the face is the one that the point lies on.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub face: Option<usize>,
-    /// A point of the face in the object frame, m; without it, the mean of the face's corners. Does nothing but find the
-    /// face where `start.angles_rad` places the fingers.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub point_m: Option<[f64; 3]>,
+keys! {
+    /// The point at which a fingertip touches the object. The object frame has the axes of the shape's description and its origin at the
+    /// object's centre of mass.
+    #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+    #[serde(deny_unknown_fields)]
+    pub struct ContactFile {
+        /// Number of the face, from 0 (`object check` lists them); without it, the face that the point lies on.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        pub face: Option<usize>,
+        /// Point of the face in the object frame, m; without it, the mean of the face's corners. Where `start.angles_rad`
+        /// places the fingers, it does nothing but find the face.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        pub point_m: Option<[f64; 3]>,
+    }
 }
 
-/// How the run begins, at rest.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct StartFile {
-    /// How deep the fingertips are indented.
-    #[serde(default)]
-    pub indentation_m: Indentation,
-    /// Angles of joints that move several fingertips, by name; the others of these stay at their nominal angles.
-    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
-    pub trunk_rad: BTreeMap<String, f64>,
-    /// Angles of all joints, rad. They replace the inverse kinematics: contact points and indentations follow.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub angles_rad: Option<Vec<f64>>,
+keys! {
+    /// Posture and indentation at the start, at rest.
+    #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+    #[serde(deny_unknown_fields)]
+    pub struct StartFile {
+        /// Indentation of the fingertips at the start, m; or `"equilibrium"`, at which the normal forces are those of Eq. 57,
+        /// where the grasp settles.
+        #[serde(default)]
+        pub indentation_m: Indentation,
+        /// Angles of joints that move several fingertips (an arm's), rad, by their names: `trunk_rad = { wrist = 0.3 }`. Those
+        /// left out stay at their nominal angles.
+        #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+        pub trunk_rad: BTreeMap<String, f64>,
+        /// Angles of all joints, rad, in the hand's order. They replace the inverse kinematics: contact points and indentations
+        /// follow.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        pub angles_rad: Option<Vec<f64>>,
+    }
 }
 
 /// Indentation `dr_i` at the start.
@@ -156,33 +173,37 @@ impl<'de> Deserialize<'de> for Indentation {
     }
 }
 
-/// The joint sensors.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Sensors {
-    /// The controller sees true angles and speeds instead of encoder counts.
-    #[serde(default)]
-    pub ideal: bool,
-    /// Standard deviation of the noise on the counts, counts.
-    #[serde(default)]
-    pub noise_counts: f64,
+keys! {
+    /// The joint sensors.
+    #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+    #[serde(deny_unknown_fields)]
+    pub struct Sensors {
+        /// `true`: the controller gets true angles and speeds in place of encoder counts, as in the paper's model.
+        #[serde(default)]
+        pub ideal: bool,
+        /// Standard deviation of the noise on the encoders, counts.
+        #[serde(default)]
+        pub noise_counts: f64,
+    }
 }
 
-/// The motors and their amplifiers.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Actuators {
-    /// Control periods between reading the encoders and applying the torques, 0 to 1000. A hand whose controller reads first and
-    /// writes last has 1.
-    #[serde(default = "Actuators::output_delay_ticks")]
-    pub output_delay_ticks: u32,
-    /// Whether the torque limits of the hand's joints apply.
-    #[serde(default = "yes")]
-    pub torque_limits: bool,
-    /// The fastest that a torque may change, N m/s; without it, a joint's whole torque within the hand's
-    /// `safety.slew_s`, if torque limits apply.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub slew_limit_nm_s: Option<f64>,
+keys! {
+    /// The motors and their amplifiers.
+    #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+    #[serde(deny_unknown_fields)]
+    pub struct Actuators {
+        /// Control periods from the reading of the encoders to the torque that follows from it, 0 to 1000. A controller that
+        /// reads first and writes last has 1.
+        #[serde(default = "Actuators::output_delay_ticks")]
+        pub output_delay_ticks: u32,
+        /// `false`: the motors have no torque limits, as in the paper's model.
+        #[serde(default = "yes")]
+        pub torque_limits: bool,
+        /// Fastest change of a torque, N m/s; without it, a joint's whole torque within the hand's `safety.slew_s`, if torque
+        /// limits apply.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        pub slew_limit_nm_s: Option<f64>,
+    }
 }
 
 impl Actuators {
@@ -197,13 +218,15 @@ impl Default for Actuators {
     }
 }
 
-/// The friction of the joints.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Friction {
-    /// Factor on the friction of the hand's joints; 0 for the paper's model, which has none.
-    #[serde(default = "one")]
-    pub scale: f64,
+keys! {
+    /// The friction of the joints.
+    #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+    #[serde(deny_unknown_fields)]
+    pub struct Friction {
+        /// Factor on the friction of the hand's joints; 0 in the paper's model, which has none.
+        #[serde(default = "one")]
+        pub scale: f64,
+    }
 }
 
 impl Default for Friction {
@@ -212,22 +235,25 @@ impl Default for Friction {
     }
 }
 
-/// The simulated world.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct PlantSettings {
-    /// Step of the integrator, s; divides the sampling period.
-    #[serde(default = "PlantSettings::substep_s")]
-    pub substep_s: f64,
-    /// Gravity on the hand in its base frame, m/s^2.
-    #[serde(default = "PlantSettings::gravity_m_s2")]
-    pub gravity_m_s2: [f64; 3],
-    /// Whether the object has weight too. The paper neglects it (assumption 5).
-    #[serde(default)]
-    pub gravity_on_object: bool,
-    /// What pushes the object from outside, and when; several at a time add up.
-    #[serde(rename = "push", default, skip_serializing_if = "Vec::is_empty")]
-    pub pushes: Vec<PushFile>,
+keys! {
+    /// The simulated world.
+    #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+    #[serde(deny_unknown_fields)]
+    pub struct PlantSettings {
+        /// Step of the integrator, s; it has to divide `control.period_s`.
+        #[serde(default = "PlantSettings::substep_s")]
+        pub substep_s: f64,
+        /// Gravity in the hand's base frame, m/s^2. It acts on the hand; on the object only with `gravity_on_object`.
+        #[serde(default = "PlantSettings::gravity_m_s2")]
+        pub gravity_m_s2: [f64; 3],
+        /// `true`: gravity acts on the object too. The paper neglects its weight (assumption 5), so that it has none unless
+        /// asked.
+        #[serde(default)]
+        pub gravity_on_object: bool,
+        /// Pushes at the object from outside, one `[[plant.push]]` each; several at a time add up.
+        #[serde(rename = "push", default, skip_serializing_if = "Vec::is_empty")]
+        pub pushes: Vec<PushFile>,
+    }
 }
 
 impl PlantSettings {
@@ -251,95 +277,99 @@ impl Default for PlantSettings {
     }
 }
 
-/// A hand.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct HandFile {
-    /// Version of the format; [`SCHEMA`].
-    pub schema: u32,
-    /// A word.
-    pub name: String,
-    /// A sentence or two.
-    #[serde(default)]
-    pub description: String,
-    /// The gains of its firmware. A scene has its own.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub control: Option<Control>,
-    /// Its safety numbers, in its firmware and in scenes.
-    #[serde(default)]
-    pub safety: Safety,
-    /// The joints, each after its parent. In a file, keys of `[joint_defaults]` stand for those that a joint leaves out.
-    #[serde(rename = "joint")]
-    pub joints: Vec<JointFile>,
-    /// The fingertips. In a file, keys of `[fingertip_defaults]` stand for those that a fingertip leaves out.
-    #[serde(rename = "fingertip")]
-    pub fingertips: Vec<FingertipFile>,
+keys! {
+    /// A hand.
+    #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+    #[serde(deny_unknown_fields)]
+    pub struct HandFile {
+        /// Version of the format: 1.
+        pub schema: u32,
+        /// A word.
+        pub name: String,
+        /// A sentence or two.
+        #[serde(default)]
+        pub description: String,
+        /// The gains of its firmware. A scene has its own.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        pub control: Option<Control>,
+        /// Its safety numbers, in its firmware and in scenes.
+        #[serde(default)]
+        pub safety: Safety,
+        /// The joints, each after its parent. In a file, keys of `[joint_defaults]` stand for those that a joint leaves out.
+        #[serde(rename = "joint")]
+        pub joints: Vec<JointFile>,
+        /// The fingertips. In a file, keys of `[fingertip_defaults]` stand for those that a fingertip leaves out.
+        #[serde(rename = "fingertip")]
+        pub fingertips: Vec<FingertipFile>,
+    }
 }
 
-/// A revolute joint, the link that it carries, and its motor.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct JointFile {
-    /// Its name, which is also its link's.
-    pub name: String,
-    /// Name of the joint on whose link it sits; without it, the base.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub parent: Option<String>,
-    /// Where it sits in the parent's link frame, m.
-    #[serde(default)]
-    pub offset_m: [f64; 3],
-    /// Attitude of its link frame at zero angle in the parent's link frame: roll, pitch and yaw about fixed x, y and z
-    /// axes, in this order, rad.
-    #[serde(default)]
-    pub rotation_rpy_rad: [f64; 3],
-    /// Its axis in its link frame, a unit vector.
-    pub axis: [f64; 3],
-    /// Lower and upper end stop, rad.
-    pub limits_rad: [f64; 2],
-    /// Angle that the inverse kinematics starts from and stays close to, rad.
-    #[serde(default)]
-    pub nominal_rad: f64,
-    /// Mass of the link, kg; 0 for a link that is counted in another.
-    #[serde(default)]
-    pub mass_kg: f64,
-    /// Centre of mass in the link frame, m.
-    #[serde(default)]
-    pub mass_centre_m: [f64; 3],
-    /// Inertia about the centre of mass in the axes of the link frame, kg m^2: xx, yy, zz, and xy, xz, yz unless zero.
-    #[serde(default)]
-    pub inertia_kg_m2: InertiaFile,
-    /// Gain `C` of Eq. 30, N m s/rad.
-    pub damping_gain_nm_s_rad: f64,
-    /// The largest torque at the joint, N m.
-    pub torque_limit_nm: f64,
-    /// The largest speed at the joint, rad/s.
-    pub speed_limit_rad_s: f64,
-    /// Encoder counts in one turn of the joint, all edges counted.
-    pub encoder_counts_per_turn: f64,
-    /// Whether the count falls while the joint turns in its positive direction.
-    #[serde(default)]
-    pub encoder_reversed: bool,
-    /// The count at joint angle zero.
-    #[serde(default)]
-    pub encoder_zero_count: i32,
-    /// Whether a positive voltage at the amplifier pushes the joint in its negative direction.
-    #[serde(default)]
-    pub motor_reversed: bool,
-    /// Size of the torque at the joint for each volt at its amplifier, N m/V: amplifier (A/V) times motor (N m/A) times gear.
-    #[serde(default = "JointFile::torque_per_volt_nm_v")]
-    pub torque_per_volt_nm_v: f64,
-    /// Viscous friction at the joint, N m s/rad.
-    #[serde(default)]
-    pub viscous_friction_nm_s_rad: f64,
-    /// Coulomb friction at the joint, N m.
-    #[serde(default)]
-    pub coulomb_friction_nm: f64,
-    /// How far the joint gives before its Coulomb friction lets it slide, rad.
-    #[serde(default = "JointFile::presliding_rad")]
-    pub presliding_rad: f64,
-    /// Damping of the joint while it sticks, N m s/rad.
-    #[serde(default)]
-    pub presliding_damping_nm_s_rad: f64,
+keys! {
+    /// A revolute joint, the link that it carries, and its motor.
+    #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+    #[serde(deny_unknown_fields)]
+    pub struct JointFile {
+        /// Its name, which is also its link's.
+        pub name: String,
+        /// Name of the joint on whose link it sits; without it, the base.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        pub parent: Option<String>,
+        /// Position of its link frame in the parent's link frame, m.
+        #[serde(default)]
+        pub offset_m: [f64; 3],
+        /// Attitude of its link frame at zero angle in the parent's link frame: roll, pitch and yaw about fixed x, y and z
+        /// axes, in this order, rad.
+        #[serde(default)]
+        pub rotation_rpy_rad: [f64; 3],
+        /// Its axis in its link frame, a unit vector.
+        pub axis: [f64; 3],
+        /// Lower and upper end stop, rad.
+        pub limits_rad: [f64; 2],
+        /// Angle that the inverse kinematics starts from and stays close to, rad.
+        #[serde(default)]
+        pub nominal_rad: f64,
+        /// Mass of the link, kg; 0 for a link that is counted in another.
+        #[serde(default)]
+        pub mass_kg: f64,
+        /// Centre of mass in the link frame, m.
+        #[serde(default)]
+        pub mass_centre_m: [f64; 3],
+        /// Inertia about the centre of mass in the axes of the link frame, kg m^2: xx, yy, zz, and xy, xz, yz unless zero.
+        #[serde(default)]
+        pub inertia_kg_m2: InertiaFile,
+        /// Gain `C` of Eq. 30, N m s/rad.
+        pub damping_gain_nm_s_rad: f64,
+        /// The largest torque at the joint, N m.
+        pub torque_limit_nm: f64,
+        /// The largest speed at the joint, rad/s.
+        pub speed_limit_rad_s: f64,
+        /// Encoder counts in one turn of the joint, all edges counted.
+        pub encoder_counts_per_turn: f64,
+        /// `true` where the count falls while the joint turns in its positive direction.
+        #[serde(default)]
+        pub encoder_reversed: bool,
+        /// The count at joint angle zero.
+        #[serde(default)]
+        pub encoder_zero_count: i32,
+        /// `true` where a positive voltage at the amplifier pushes the joint in its negative direction.
+        #[serde(default)]
+        pub motor_reversed: bool,
+        /// Size of the torque at the joint for each volt at its amplifier, N m/V: amplifier (A/V) times motor (N m/A) times gear.
+        #[serde(default = "JointFile::torque_per_volt_nm_v")]
+        pub torque_per_volt_nm_v: f64,
+        /// Viscous friction at the joint, N m s/rad.
+        #[serde(default)]
+        pub viscous_friction_nm_s_rad: f64,
+        /// Coulomb friction at the joint, N m.
+        #[serde(default)]
+        pub coulomb_friction_nm: f64,
+        /// Angle by which the joint gives before its Coulomb friction lets it slide, rad.
+        #[serde(default = "JointFile::presliding_rad")]
+        pub presliding_rad: f64,
+        /// Damping of the joint while it sticks, N m s/rad.
+        #[serde(default)]
+        pub presliding_damping_nm_s_rad: f64,
+    }
 }
 
 impl JointFile {
@@ -365,24 +395,26 @@ impl Default for InertiaFile {
     }
 }
 
-/// A soft hemispherical fingertip. Its contact area is `pi (2 r dr - dr^2)`.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct FingertipFile {
-    /// Its name.
-    pub name: String,
-    /// Name of the joint whose link it is part of.
-    pub link: String,
-    /// Centre of its sphere in the link frame, m.
-    pub offset_m: [f64; 3],
-    /// Radius `r_i`, m.
-    pub radius_m: f64,
-    /// Stiffness `k_i` of Eq. 14, N/m^2.
-    pub stiffness_n_m2: f64,
-    /// Damping `xi_i` of Eq. 14 for each square metre of contact area, (N s/m)/m^2.
-    pub damping_n_s_m_per_m2: f64,
-    /// Torsional damping `b_i` of Eq. 15 for each square metre of contact area, (N m s/rad)/m^2.
-    pub torsional_damping_nm_s_rad_per_m2: f64,
+keys! {
+    /// A soft hemispherical fingertip. Its contact area is `pi (2 r dr - dr^2)`.
+    #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+    #[serde(deny_unknown_fields)]
+    pub struct FingertipFile {
+        /// Its name.
+        pub name: String,
+        /// Name of the joint whose link it is part of.
+        pub link: String,
+        /// Centre of its sphere in the link frame, m.
+        pub offset_m: [f64; 3],
+        /// Radius `r_i`, m.
+        pub radius_m: f64,
+        /// Stiffness `k_i` of Eq. 14, N/m^2.
+        pub stiffness_n_m2: f64,
+        /// Damping `xi_i` of Eq. 14 for each square metre of contact area, (N s/m)/m^2.
+        pub damping_n_s_m_per_m2: f64,
+        /// Torsional damping `b_i` of Eq. 15 for each square metre of contact area, (N m s/rad)/m^2.
+        pub torsional_damping_nm_s_rad_per_m2: f64,
+    }
 }
 
 fn one() -> f64 {

@@ -34,11 +34,7 @@ const WORDS: [(&str, &str, &str); 17] = [
     ("status", "", "mode, fault, counts, torques, what limits, and what went over the line"),
     ("arm", "", "let the joints have torque: hold their weight and damp them"),
     ("disarm", "", "take the torque away"),
-    (
-        "grasp",
-        "[FORCE_N [STIFFNESS_NM [INTEGRAL_NM_RAD]]]",
-        "close the hand and hold; without values, as configured",
-    ),
+    ("grasp", "", "close the hand and hold; without values, as configured"),
     ("release", "", "let go slowly"),
     ("stop", "", "take the torque away at once; so does Ctrl-C, and a second one quits"),
     ("clear", "", "leave a fault whose cause is gone"),
@@ -348,7 +344,7 @@ impl Console {
             }
             ("help", []) => {
                 for (word, values, words) in WORDS {
-                    say(format_args!("{:<30}  {words}", format!("{word} {values}")))?;
+                    say(format_args!("{:<30}  {words}", usage(word, values)))?;
                 }
                 return Ok(());
             }
@@ -742,10 +738,22 @@ fn integer(word: &str) -> anyhow::Result<u8> {
     word.parse().with_context(|| format!("`{word}` is not an index from 0 to 255"))
 }
 
-/// What is wrong with a line that begins with this word.
+/// Returns a command with the values that it takes. Those of `grasp` are the gains of the laws.
+fn usage(word: &str, values: &str) -> String {
+    let values = match word {
+        "grasp" => GAINS.iter().rev().fold(String::new(), |inner, gain| {
+            let separator = if inner.is_empty() { "" } else { " " };
+            format!("[{}{separator}{inner}]", gain.key.to_uppercase())
+        }),
+        _ => values.to_owned(),
+    };
+    format!("{word} {values}").trim_end().to_owned()
+}
+
+/// Returns the advice for a line that begins with this word and is not understood.
 fn misuse(word: &str) -> String {
     if let Some((word, values, words)) = WORDS.iter().find(|(known, ..)| *known == word) {
-        return format!("use: {}: {words}", format!("{word} {values}").trim_end());
+        return format!("use: {}: {words}", usage(word, values));
     }
     let known = WORDS.iter().map(|&(known, ..)| known);
     format!("`{word}` is no command: {}", similar(word, known).unwrap_or("type `help` for all".to_owned()))

@@ -1,5 +1,6 @@
 //! `[control]`: the gains of the laws, which the laws themselves declare, and what surrounds them.
 
+use super::key::FileKey;
 use blindgrasp_shared::control::{Chosen, GAINS, LAWS, PerGain};
 use serde::de::{self, Error as _, MapAccess, Visitor};
 use serde::ser::SerializeMap;
@@ -9,7 +10,7 @@ use std::sync::LazyLock;
 
 /// Writes the struct, and how it is read and written, from one line a key.
 macro_rules! control {
-    ($($(#[$doc:meta])* $field:ident: $type:ty = $default:expr;)*) => {
+    ($($(#[doc = $doc:literal])* $field:ident: $type:ty = $default:expr;)*) => {
         /// The controller: laws, their gains, and what surrounds them. The damping gains are the hand's.
         #[derive(Clone, Debug, PartialEq)]
         pub struct Control {
@@ -18,12 +19,16 @@ macro_rules! control {
             pub gains: PerGain<f64>,
             /// The laws that may act. A law whose gains are all zero does nothing anyway.
             pub laws: Chosen,
-            $($(#[$doc])* pub $field: $type,)*
+            $($(#[doc = $doc])* pub $field: $type,)*
         }
 
         impl Control {
-            /// Names of the keys other than gains.
-            const KEYS: &[&str] = &["laws", $(stringify!($field)),*];
+            /// All keys other than gains and `laws`.
+            pub const KEYS: &'static [FileKey] = &[$(FileKey {
+                field: stringify!($field),
+                value: stringify!($type),
+                words: concat!($($doc),*),
+            }),*];
 
             fn read_map<'de, A: MapAccess<'de>>(mut map: A) -> Result<Self, A::Error> {
                 let mut gains = PerGain::all(None);
@@ -69,23 +74,26 @@ macro_rules! control {
 control! {
     /// Factor on the damping gains of the hand's joints.
     damping_scale: f64 = 1.0;
-    /// Whether the term `g` of Eq. 30 holds the weight of the links.
+    /// `true`: the term `g` of Eq. 30 holds the weight of the links.
     gravity_compensation: bool = true;
     /// Sampling period, s.
     period_s: f64 = 1e-3;
-    /// Time over which `f_d` rises from zero, s.
+    /// Time in which the force rises from zero, s.
     soft_start_s: f64 = 0.0;
-    /// Time that the motors' amplifiers take to start after they got power, ms: so long after `Arm` there is no torque.
+    /// Time that the motors' amplifiers take to start after they got power, ms, by their data sheet: so long after `Arm` there
+    /// is no torque.
     amplifier_start_ms: u32 = 0;
     /// Bandwidth of the estimate of joint angles and speeds from the encoder counts, Hz. Ideal sensors need no estimate.
     estimator_bandwidth_hz: f64 = 50.0;
-    /// Whether soft end stops keep the joints within their limits.
+    /// `true`: soft end stops keep the joints within their limits.
     end_stops: bool = true;
 }
 
 /// Every key, for suggestions.
-static ALL_KEYS: LazyLock<Vec<&'static str>> =
-    LazyLock::new(|| GAINS.iter().map(|gain| gain.key).chain(Control::KEYS.iter().copied()).collect());
+static ALL_KEYS: LazyLock<Vec<&'static str>> = LazyLock::new(|| {
+    let others = Control::KEYS.iter().map(|key| key.field);
+    GAINS.iter().map(|gain| gain.key).chain(["laws"]).chain(others).collect()
+});
 
 /// A key that there is. What is refused while it is read is told with its place.
 struct Key(String);

@@ -37,7 +37,7 @@ mod weld;
 
 use super::check::{Result, within};
 use super::error::{Notice, Place, SceneError, suggestion};
-use super::file::ShapeFile;
+use super::file::{FileKey, ShapeFile};
 use super::library::Home;
 use super::tree::{Entry, Node, Value};
 use repair::{Repaired, repair};
@@ -46,7 +46,18 @@ use std::path::{Path, PathBuf};
 
 pub use unit::Unit;
 
-/// What a mesh file may be scaled by.
+/// The keys of `[shape.mesh]` that stand for vertices and triangles.
+pub const FILE_KEYS: [FileKey; 3] = [
+    FileKey { field: "file", value: "String", words: "STL or OBJ file, by its path relative to this file" },
+    FileKey {
+        field: "unit",
+        value: "String",
+        words: "Unit of the lengths in the file: `mm`, `cm`, `m` or `in`",
+    },
+    FileKey { field: "scale", value: "f64", words: "Factor on the lengths in the file" },
+];
+
+/// The least and the greatest factor on the lengths of a mesh file.
 const SCALES: [f64; 2] = [1e-6, 1e6];
 
 /// No body has a vertex farther than this from the origin, m.
