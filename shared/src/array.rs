@@ -7,15 +7,16 @@ use core::marker::PhantomData;
 use serde::de::{Error, SeqAccess, Visitor};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
-/// What an array consists of.
+/// An item of an array.
 pub(crate) trait Item: Copy {
-    /// What is behind the last one that counts.
+    /// Returns the item that fills an array behind the last one that counts.
     fn filler() -> Self;
-    /// Whether it is one.
+    /// Returns `true` if it is one.
     fn is_filler(&self) -> bool;
 }
 
-/// How many items of an array count. Not inlined, as the others: for each size the compiler would unroll it.
+/// Returns the number of items of an array that count. Not inlined, as the others: for each size the compiler would
+/// unroll it.
 #[inline(never)]
 pub(crate) fn count<T: Item>(items: &[T]) -> usize {
     items.iter().rposition(|item| !item.is_filler()).map_or(0, |last| last + 1)

@@ -14,7 +14,7 @@ impl fmt::Display for BufferTooSmall {
 
 impl core::error::Error for BufferTooSmall {}
 
-/// Why bytes are no snapshot of a hand's state.
+/// An error in the bytes of a snapshot.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SnapshotError {
     /// It is of a hand with other numbers of joints and fingertips.

@@ -1,4 +1,4 @@
-//! What a user may ask of the hand, and what it answers.
+//! Commands of a user to the hand, and its answers.
 //!
 //! Every command gets an [`Answer`] in the record of the tick that took it: done, or refused with a named reason.
 //! Which command is taken in which mode is the table in [`supervisor`](crate::supervisor).
@@ -24,7 +24,7 @@ pub enum Command {
     ClearFault,
 }
 
-/// How firmly to grasp; a gain that is left out is as configured.
+/// The gains of a grasp; a gain that is left out is as configured.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Grasp {
     /// The gains that are asked for.
@@ -66,7 +66,7 @@ impl Command {
 /// Writes the enum and its tables from one line a refusal.
 macro_rules! refusals {
     ($($name:ident = $words:literal;)*) => {
-        /// Why a request was refused.
+        /// A refusal of a request.
         #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
         pub enum Refusal {
             $(#[doc = concat!("\"", $words, "\"")] $name,)*
@@ -128,7 +128,7 @@ impl fmt::Display for Refusal {
 
 impl core::error::Error for Refusal {}
 
-/// What became of a command.
+/// The result of a command.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Answer {
     /// The command.

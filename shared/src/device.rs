@@ -22,11 +22,11 @@ use crate::tick::{self, Input, Params, Sensed, State};
 /// The inputs of a tick besides the joints.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Inputs<const J: usize> {
-    /// Whether the tick before missed its deadline.
+    /// `true` if the tick before missed its deadline.
     pub late: bool,
-    /// Whether the supply was too low at some time since the tick before.
+    /// `true` if the supply was too low at some time since the tick before.
     pub supply_low: bool,
-    /// How long it took, processor cycles; 0 where nothing counts them.
+    /// Its time, processor cycles; 0 where nothing counts them.
     pub cycles: u32,
     /// Records and replies that were lost since the start because a queue was full.
     pub dropped: u32,
@@ -34,22 +34,22 @@ pub struct Inputs<const J: usize> {
     pub waiting: usize,
     /// A request.
     pub packet: Option<Packet<J>>,
-    /// Whether there is no room for an answer; then there is no request either.
+    /// `true` if there is no room for an answer; then there is no request either.
     pub no_room: bool,
-    /// What became of the order that a tick before has given to the store.
+    /// The result of the order that an earlier tick gave to the store.
     pub stored: Option<Result<(), StoreError>>,
 }
 
-/// What a tick gives.
+/// The outputs of a tick.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Outputs<const J: usize> {
     /// Torques of the motors in the next tick, N m.
     pub torques_nm: [f32; J],
-    /// Whether the amplifiers have power in it.
+    /// `true` if the amplifiers have power in it.
     pub powered: bool,
-    /// What the tick did.
+    /// The record of the tick.
     pub record: Record<J>,
-    /// How the tick is told of, if it is.
+    /// The form in which the tick is told, if it is.
     pub telemetry: Option<Form>,
     /// The answer to the request.
     pub reply: Option<Reply<'static, J>>,
@@ -57,12 +57,12 @@ pub struct Outputs<const J: usize> {
     pub baud: Option<u32>,
     /// A part of a snapshot that is to be sent.
     pub part: Option<Part>,
-    /// What the store is to do; there is no other until [`Inputs::stored`] says what became of it.
+    /// The order to the store; there is no other until [`Inputs::stored`] says what became of it.
     pub order: Option<Order>,
 }
 
 impl<const J: usize> Outputs<J> {
-    /// What there is before the first tick: nothing.
+    /// Returns the outputs before the first tick: nothing.
     pub const fn none() -> Self {
         Self {
             torques_nm: [0.0; J],
@@ -91,9 +91,9 @@ pub struct Device<const J: usize, const F: usize> {
     saving: Option<Save>,
     /// The answer to a save that is over, until a tick has no other.
     saved: Option<Reply<'static, J>>,
-    /// Whether what is read with the signs and zeros that were set is known to be right.
+    /// `true` if what is read with the signs and zeros that were set is known to be right.
     is_confirmed: bool,
-    /// What went wrong when the joints were last written.
+    /// The failure of the joints when they were last written.
     failed: Option<Raised>,
 }
 
@@ -126,7 +126,7 @@ impl<const J: usize, const F: usize> Device<J, F> {
         &self.params
     }
 
-    /// What the tick remembers.
+    /// Returns the state of the tick.
     pub fn state(&self) -> &State<J, F> {
         &self.state
     }
@@ -310,7 +310,7 @@ impl<const J: usize, const F: usize> Device<J, F> {
         if self.telemetry.part_is_due(waiting) { self.snapshot.next() } else { None }
     }
 
-    /// What becomes of a request before the tick.
+    /// Takes a request before the tick.
     #[inline(never)]
     fn ask(&mut self, packet: &Packet<J>, reading: &Reading<J>, burst: &Burst<J>) -> Asked<J> {
         let sequence = packet.sequence;
@@ -393,7 +393,7 @@ impl<const J: usize, const F: usize> Device<J, F> {
     }
 }
 
-/// What became of a request before the tick.
+/// The result of a request before the tick.
 enum Asked<const J: usize> {
     Nothing,
     Answered(Reply<'static, J>),
@@ -408,10 +408,10 @@ struct Save {
     /// Number of the request, and of its session.
     sequence: u16,
     session: u16,
-    /// Whether the hand's file is to hold once it is over.
+    /// `true` if the hand's file is to hold once it is over.
     forgets: bool,
     saving: Saving,
-    /// Whether the store has not yet done what it was told.
+    /// `true` if the store has not yet done what it was told.
     is_waiting: bool,
 }
 
@@ -432,7 +432,7 @@ struct Session {
     before: u16,
     /// Number of the last request that was taken.
     sequence: u16,
-    /// Whether the host has the same interface version.
+    /// `true` if the host has the same interface version.
     understood: bool,
     /// Ticks since the last request that was taken.
     quiet_ticks: u32,
@@ -457,12 +457,12 @@ impl Session {
         *self = Self { number, is_open: true, before, sequence, understood, quiet_ticks: 0 };
     }
 
-    /// Whether somebody has asked for something a moment ago, and has not said goodbye.
+    /// Returns `true` if somebody has asked for something a moment ago, and has not said goodbye.
     fn is_in_use(&self) -> bool {
         self.is_open && self.quiet_ticks < IN_USE_TICKS
     }
 
-    /// Why a request of this session and number is not taken; otherwise it is now the last.
+    /// Returns the reason for which a request of this session and number is refused; otherwise it is now the last.
     fn refuse(&mut self, session: u16, sequence: u16) -> Option<Refusal> {
         if session != 0 && session == self.before && self.is_open {
             return Some(Refusal::SessionTaken);
@@ -499,10 +499,10 @@ const PART_WAITING_MOST: usize = 3;
 /// the input records.
 const OVERDUE_TICKS: u16 = 100;
 
-/// Which records are sent.
+/// The records that are sent.
 #[derive(Clone, Copy, Debug)]
 struct Telemetry {
-    /// What was asked for: one in so many ticks; 0 for none.
+    /// The decimation that was asked for: one in so many ticks; 0 for none.
     decimation: u16,
     signals: Signals,
     /// Ticks until the next full record, and for how long it could not be told.
@@ -526,12 +526,12 @@ impl Telemetry {
         part_left: 0,
     };
 
-    /// What is asked for from now on.
+    /// Begins to send these signals, one record in so many ticks.
     fn begin(&mut self, decimation: u16, signals: Signals) {
         *self = Self { decimation, signals, sent: self.sent, ..Self::OFF };
     }
 
-    /// Whether input records stand in for full ones.
+    /// Returns `true` if input records stand in for full ones.
     fn has_inputs(&self) -> bool {
         self.signals.contain(Signals::INPUTS)
     }
@@ -541,7 +541,7 @@ impl Telemetry {
         if self.has_inputs() { 1 } else { self.decimation.max(1) }
     }
 
-    /// How this tick is told of.
+    /// Returns the form in which this tick is told.
     fn due(&mut self, waiting: usize) -> Option<Form> {
         if self.decimation == 0 {
             return None;
@@ -558,12 +558,12 @@ impl Telemetry {
         self.has_inputs().then_some(Form::Input)
     }
 
-    /// Whether snapshots are sent.
+    /// Returns `true` if snapshots are sent.
     fn sends_state(&self) -> bool {
         self.decimation > 0 && self.signals.contain(Signals::STATE)
     }
 
-    /// Whether the state is to be saved; never before the last snapshot is on its way.
+    /// Returns `true` if the state is to be saved; never before the last snapshot is on its way.
     fn state_is_due(&mut self, is_over: bool) -> bool {
         self.state_left = self.state_left.saturating_sub(1);
         let is_due = self.state_left == 0 && is_over;
@@ -573,7 +573,7 @@ impl Telemetry {
         is_due
     }
 
-    /// Whether a part is to be sent.
+    /// Returns `true` if a part is to be sent.
     fn part_is_due(&mut self, waiting: usize) -> bool {
         self.part_left = self.part_left.saturating_sub(1);
         let is_due = self.part_left == 0 && waiting <= PART_WAITING_MOST;

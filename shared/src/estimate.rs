@@ -46,14 +46,14 @@ use crate::math::Real;
 use crate::parameter::ParameterError;
 use crate::period::Period;
 
-/// How the counts of one joint are read.
+/// The reading of one joint's counts.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Encoder {
     /// The count at joint angle zero.
     pub zero_count: i32,
     /// Joint angle of one count, rad; positive.
     pub rad_per_count: f32,
-    /// Whether the joint angle falls while the count rises.
+    /// `true` if the joint angle falls while the count rises.
     pub reversed: bool,
 }
 
@@ -139,12 +139,12 @@ pub struct Estimator<const J: usize> {
     scales: [Scale; J],
 }
 
-/// What the filter remembers of one joint.
+/// The filter's memory of one joint.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Track {
     /// The newest count.
     count: i32,
-    /// Where the joint is believed to be, ahead of the newest count, counts: between -1/2 and 1/2.
+    /// The assumed position of the joint ahead of the newest count, counts: between -1/2 and 1/2.
     play: f32,
     /// Estimated angle ahead of the newest count, counts.
     ahead: f32,
@@ -152,7 +152,7 @@ struct Track {
     speed: f32,
 }
 
-/// What the filter remembers from tick to tick; the first sample starts it, at rest.
+/// The filter's memory from tick to tick; the first sample starts it, at rest.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Tracks<const J: usize> {
     started: bool,
@@ -202,7 +202,7 @@ impl<const J: usize> Default for Tracks<J> {
     }
 }
 
-/// How the joints move; zero beyond the hand's joints.
+/// The motion of the joints; zero beyond the hand's joints.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Motion<const J: usize> {
     /// Joint angles `q`, rad.

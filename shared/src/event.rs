@@ -1,4 +1,4 @@
-//! What comes to a tick from outside besides counts and commands: it is recorded, so that a replay has it too.
+//! Events that come to a tick from outside besides counts and commands. They are recorded, so that a replay has it too.
 
 use core::fmt;
 use serde::{Deserialize, Serialize};
@@ -71,7 +71,7 @@ impl Events {
         if bits < 1 << Event::ALL.len() { Some(Self(bits)) } else { None }
     }
 
-    /// Whether one is among them.
+    /// Returns `true` if one is among them.
     pub const fn contains(self, event: Event) -> bool {
         self.0 & event as u8 != 0
     }

@@ -1,4 +1,4 @@
-//! What a firmware is, and how its microcontroller started: told on `Hello`, and found in an image before it is flashed.
+//! The identity of a firmware and of its start: told on `Hello`, and found in an image before it is flashed.
 
 use crate::bytes::BufferTooSmall;
 use core::fmt;
@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 /// Units of everything on the wire.
 pub const UNITS: &str = "SI: m, rad, s, kg, N, N m; encoder counts";
 
-/// What a firmware image is. It is embedded in the image behind [`Self::MAGIC`].
+/// The identity of a firmware image. It is embedded in the image behind [`Self::MAGIC`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Image<'a> {
     /// [`INTERFACE_VERSION`](crate::telemetry::INTERFACE_VERSION) that it speaks. Stays the first field for ever.
@@ -31,7 +31,7 @@ pub struct Image<'a> {
 }
 
 impl<'a> Image<'a> {
-    /// What stands before it in the bytes of an image.
+    /// The mark before it in the bytes of an image.
     pub const MAGIC: [u8; 16] = *b"BLINDGRASP-IMAGE";
 
     /// Writes magic and description into a buffer; returns how many bytes they take.
@@ -78,18 +78,18 @@ impl fmt::Display for Image<'_> {
 /// A firmware that runs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Identity<'a> {
-    /// What was flashed.
+    /// The image that was flashed.
     #[serde(borrow)]
     pub image: Image<'a>,
     /// [`UNITS`].
     pub units: &'a str,
-    /// What gives it its time.
+    /// The source of its clock.
     pub clock: Clock,
-    /// Why it started.
+    /// The cause of its start.
     pub reset: ResetCause,
-    /// How it ended before, if that was not in order.
+    /// The crash in which it ended before, if it did.
     pub crash: Option<Crash>,
-    /// Where the microcontroller is held in reset when its supply sags.
+    /// The supply voltage below which the microcontroller is held in reset.
     pub brown_out: BrownOut,
     /// Frequency of the processor's clock, in which a record's cycles are counted, Hz; 0 where nothing counts them.
     pub clock_hz: u32,
@@ -98,7 +98,7 @@ pub struct Identity<'a> {
     /// The parameters that differ from the hand's file: a bit for each, by its
     /// [number](crate::parameters::Parameter::number).
     pub changed: u64,
-    /// What became at the start of the parameters that were saved; `None` where there is nothing to save to.
+    /// The result of restoring the saved parameters at the start; `None` where there is nothing to save to.
     pub restored: Option<Restored>,
 }
 
@@ -120,7 +120,7 @@ impl<'a> Identity<'a> {
     }
 }
 
-/// What became of the saved parameters at the start.
+/// The result of restoring the saved parameters at the start.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Restored {
     /// Parameters that were saved.
@@ -130,7 +130,7 @@ pub struct Restored {
     pub ignored: u16,
 }
 
-/// What gives a microcontroller its time.
+/// The source of a microcontroller's clock.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Clock {
     /// The crystal.
@@ -153,7 +153,7 @@ impl Clock {
     }
 }
 
-/// Why a microcontroller started.
+/// The cause of a microcontroller's start.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum ResetCause {
     /// Its supply came up.
@@ -218,14 +218,14 @@ impl BrownOut {
     }
 }
 
-/// How a firmware ended.
+/// The crash of a firmware.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Crash {
-    /// What it was.
+    /// Its kind.
     pub kind: CrashKind,
-    /// Where it was, as an address of the image; 0 if unknown.
+    /// Its place, as an address of the image; 0 if unknown.
     pub program_counter: u32,
-    /// Where that had been called from; 0 if unknown.
+    /// The address that called the place; 0 if unknown.
     pub link_register: u32,
     /// Line of the source; 0 if unknown.
     pub line: u32,
@@ -233,7 +233,7 @@ pub struct Crash {
     pub file_hash: u32,
 }
 
-/// What ended a firmware.
+/// A kind of crash.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum CrashKind {
     /// A panic.

@@ -22,7 +22,7 @@ pub enum Reading<const J: usize> {
     Failed(Raised),
     /// Joints that failed and have passed their self-test since. A fault that is cleared brings them back.
     Tested {
-        /// Why they failed.
+        /// The failure.
         raised: Raised,
         /// Encoder counts that they would begin with now.
         counts: [i32; J],

@@ -34,20 +34,20 @@ use crate::bytes::{BufferTooSmall, Loader, Saver, SnapshotError};
 use crate::control::{Account, PerGain};
 use crate::estimate::Motion;
 
-/// What a tick enters.
+/// The entries of a tick.
 #[derive(Clone, Copy, Debug)]
 pub struct Entry<'a, const J: usize> {
-    /// How the joints move.
+    /// The motion of the joints.
     pub motion: &'a Motion<J>,
     /// Torques of the tick before, N m.
     pub last_nm: &'a [f32; J],
-    /// What the laws do in this tick; `None` without torque.
+    /// The laws' account of this tick; `None` without torque.
     pub law: Option<&'a Account<f32>>,
     /// The tick period, s.
     pub period_s: f32,
 }
 
-/// What is remembered from tick to tick.
+/// The ledger's memory from tick to tick.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Ledger<const J: usize> {
     /// Torques of the tick before the last, N m.
@@ -159,7 +159,7 @@ impl<const J: usize> Ledger<J> {
         self.work.sum
     }
 
-    /// What the law's damping has taken in the same time, J.
+    /// Returns the energy that the law's damping has taken in the same time, J.
     pub fn damped_j(&self) -> f32 {
         self.damped.sum
     }

@@ -1,4 +1,4 @@
-//! What the joints may be asked for: soft end stops, torque limits, slew limits, in this order.
+//! Limits of the joints' torques: soft end stops, torque limits, slew limits, in this order.
 //!
 //! - A **soft end stop** acts in a margin before each end of the joint's range. Towards the end it fades out the torque
 //!   that pushes there, to nothing at the end itself; a spring pushes back with the depth, and a damper, which fades in
@@ -70,12 +70,12 @@ impl Limiting {
         self.0 |= limit as u8;
     }
 
-    /// Whether a reason is among them.
+    /// Returns `true` if a reason is among them.
     pub const fn contains(self, limit: Limit) -> bool {
         self.0 & limit as u8 != 0
     }
 
-    /// Whether nothing limits.
+    /// Returns `true` if nothing limits.
     pub const fn is_empty(self) -> bool {
         self.0 == 0
     }
@@ -112,7 +112,8 @@ pub struct LimitConfig<const J: usize> {
     pub torque_nm: Option<[f32; J]>,
     /// Largest change of each joint's torque, N m/s.
     pub slew_nm_s: Option<[f32; J]>,
-    /// How far before the end of each joint's range its soft end stop begins to act, rad; at most half the range.
+    /// Distance from the end of each joint's range at which its soft end stop begins to act, rad; at most half the
+    /// range.
     pub stop_margin_rad: Option<[f32; J]>,
     /// Torque with which a stop pushes back, by depth into the margin, N m/rad.
     pub stop_stiffness_nm_rad: Option<[f32; J]>,
@@ -156,9 +157,9 @@ impl JointLimits {
 /// The soft end stops of one joint.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Stop {
-    /// Where the lower margin begins, rad.
+    /// Beginning of the lower margin, rad.
     lower_rad: f32,
-    /// Where the upper margin begins, rad.
+    /// Beginning of the upper margin, rad.
     upper_rad: f32,
     /// One over the margin, 1/rad.
     per_margin: f32,
@@ -202,7 +203,7 @@ impl<const J: usize> LimitConfig<J> {
     }
 }
 
-/// What is configured for one joint.
+/// The configuration of one joint.
 struct JointConfig {
     joint: usize,
     range_rad: (f32, f32),

@@ -26,12 +26,12 @@ impl<T, const N: usize> List<T, N> {
         Self { items: [filler; N], count: 0 }
     }
 
-    /// How many items there are.
+    /// Returns the number of items.
     pub fn len(&self) -> usize {
         self.count
     }
 
-    /// Whether there are none.
+    /// Returns `true` if there are none.
     pub fn is_empty(&self) -> bool {
         self.count == 0
     }

@@ -25,7 +25,7 @@ use postcard::Deserializer;
 use postcard::de_flavors::Flavor;
 use serde::{Deserialize, Serialize};
 
-/// Why bytes are not a hand.
+/// An error in the bytes of a hand.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ModelError {
     /// They do not have the CRC that they carry.
@@ -48,7 +48,7 @@ impl fmt::Display for ModelError {
 
 impl core::error::Error for ModelError {}
 
-/// What stands between the hand and the parameters.
+/// The part between the hand and the parameters.
 #[derive(Serialize, Deserialize)]
 struct Head<const J: usize> {
     rad_per_count: List<f32, J>,

@@ -60,7 +60,7 @@ impl fmt::Display for Text {
     }
 }
 
-/// What there is one of.
+/// The thing that has a value of its own.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Each {
     /// Nothing: there is one, with index 0.
@@ -78,7 +78,7 @@ pub struct ParameterError {
     pub parameter: Text,
     /// The joint that it belongs to, if it belongs to one.
     pub joint: Option<usize>,
-    /// What it has to be.
+    /// The requirement.
     pub reason: &'static str,
 }
 

@@ -17,7 +17,7 @@ use core::fmt;
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
-/// How far the line may move a parameter from what the hand's file says.
+/// The bound that the hand's file sets to a parameter on the line.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Bound {
     /// As far as it can be used.
@@ -49,7 +49,7 @@ struct Row {
     place: Place,
 }
 
-/// Where a parameter is kept.
+/// The place of a parameter in the configuration.
 #[derive(Clone, Copy)]
 enum Place {
     /// In the configuration, where the row says.
@@ -277,12 +277,12 @@ impl Parameter {
         self.row().bound
     }
 
-    /// Whether what the joints' angles are read from hangs on it: their signs and zeros.
+    /// Returns `true` if what the joints' angles are read from hangs on it: their signs and zeros.
     pub fn is_reading(self) -> bool {
         matches!(self, Self::ENCODER_REVERSED | Self::ENCODER_ZERO)
     }
 
-    /// Whether it says how firmly to grasp, so that it may be asked for with each grasp.
+    /// Returns `true` if it says how firmly to grasp, so that it may be asked for with each grasp.
     pub fn is_gain(self) -> bool {
         matches!(self.row().place, Place::Gain(_))
     }
@@ -570,13 +570,13 @@ impl<const J: usize, const F: usize> Params<J, F> {
         Ok(())
     }
 
-    /// Whether signs or zeros are other than in the hand's file.
+    /// Returns `true` if signs or zeros are other than in the hand's file.
     pub fn reading_differs(&self) -> bool {
         let is_changed = |parameter: &Parameter| self.changed & (1 << parameter.number()) != 0;
         Parameter::ALL.iter().filter(|parameter| parameter.is_reading()).any(is_changed)
     }
 
-    /// Whether a parameter is other than in the hand's file, of any joint or axis.
+    /// Returns `true` if a parameter is other than in the hand's file, of any joint or axis.
     fn differs(&self, parameter: Parameter) -> bool {
         (0..parameter.count(self.hand().joint_count()))
             .any(|index| self.get(parameter, index).is_ok_and(|setting| setting.value != setting.file))

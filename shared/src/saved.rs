@@ -12,7 +12,7 @@ use embedded_storage::nor_flash::NorFlash;
 /// Parameters that are looked at in a tick.
 const LOOKS: usize = 8;
 
-/// What the store is to do next.
+/// An order to the store.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Order {
     /// Begin a set of so many entries.
@@ -42,7 +42,7 @@ enum Stage {
 }
 
 impl Saving {
-    /// What differs from the hand's file.
+    /// The differences from the hand's file.
     pub const DIFFERENCES: Self = Self::from(0);
     /// Nothing: the hand's file is to hold again.
     pub const NOTHING: Self = Self::from(Parameter::COUNT as u8);
@@ -51,7 +51,7 @@ impl Saving {
         Self { stage: Stage::Count, first, next: (first, 0), entry_count: 0 }
     }
 
-    /// Whether every order was given.
+    /// Returns `true` if every order was given.
     pub fn is_over(&self) -> bool {
         self.stage == Stage::Over
     }
@@ -90,7 +90,8 @@ impl Saving {
     }
 }
 
-/// How often all values are tried: a gain has to be within its limit, and either may have been saved first.
+/// The number of times that all values are tried: a gain has to be within its limit, and either may have been saved
+/// first.
 const PASSES: usize = 2;
 
 impl<S: NorFlash> Store<S> {

@@ -20,7 +20,7 @@ use serde::{Deserialize, Serialize};
 /// release's version.
 pub const INTERFACE_VERSION: u16 = 5;
 
-/// Why bytes are not a record.
+/// An error in the bytes of a record.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum DecodeError {
     /// They end too early, or hold what no record holds.
@@ -59,9 +59,9 @@ pub enum Kind {
     Fault,
     /// The number of a joint, or none.
     Joint,
-    /// What became of a command, or none.
+    /// The result of a command, or none.
     Answer,
-    /// What limits a torque.
+    /// The limit that acts on a torque.
     Limiting,
 }
 
@@ -84,15 +84,15 @@ pub enum Value<'a> {
     Fault(Fault),
     /// The number of a joint.
     Joint(u8),
-    /// What became of a command.
+    /// The result of a command.
     Answer(Answer),
-    /// What limits a torque.
+    /// The limit that acts on a torque.
     Limiting(Limiting),
     /// A count for each joint.
     Counts(&'a [i32]),
     /// A real number for each joint.
     Reals(&'a [f32]),
-    /// What limits each joint's torque.
+    /// The limit that acts on each joint's torque.
     Limits(&'a [Limiting]),
 }
 
@@ -135,7 +135,7 @@ pub struct Told<'a> {
     pub signal: Signal,
     /// Its type; of what is told for each joint, that of a joint.
     pub kind: Kind,
-    /// What there is one of: the hand, or each joint.
+    /// The thing that has a value of its own: the hand, or each joint.
     pub each: Each,
     /// Its value.
     pub value: Value<'a>,
@@ -341,7 +341,8 @@ impl Field for Option<Answer> {
 /// Writes the record, and all that follows from it, from one line a field.
 macro_rules! signals {
     ($($field:ident: $type:ty = $named:expr;)*) => {
-        /// What one tick took in, decided and put out. Its fields are the rows of the table of [signals](self).
+        /// The record of one tick: all that it took in, decided and put out. Its fields are the rows of the table of
+        /// [signals](self).
         #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
         #[allow(missing_docs)]
         pub struct Record<const J: usize> {

@@ -45,7 +45,7 @@ const READY: u32 = 0x5EAD_1E55;
 /// Last word of a set that was read back.
 const VALID: u32 = 0x600D_5E75;
 const BLANK: u32 = u32::MAX;
-/// What a word can be programmed to whatever it holds.
+/// The value that a word can be programmed to whatever it holds.
 const CLEARED: u32 = 0;
 
 /// Free slots below which a sector is erased: so many saves are possible after every start.
@@ -69,20 +69,20 @@ pub struct Set {
     pub sequence: u32,
     /// Hash of the hand that it was saved for.
     pub hand_hash: u32,
-    /// How many entries it has.
+    /// The number of its entries.
     pub entry_count: usize,
-    /// Where it begins.
+    /// Its beginning.
     at: u32,
 }
 
 impl Set {
-    /// Whether it was saved after another: by the shorter way round, as sequence numbers wrap.
+    /// Returns `true` if it was saved after another: by the shorter way round, as sequence numbers wrap.
     fn is_newer_than(&self, other: &Self) -> bool {
         self.sequence.wrapping_sub(other.sequence).cast_signed() > 0
     }
 }
 
-/// Why nothing is saved. What was valid stays so.
+/// The reason for which nothing is saved. What was valid stays so.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum StoreError {
     /// The flash is not two sectors of at least two slots, or can't be written by words.
@@ -93,7 +93,7 @@ pub enum StoreError {
     TooManyEntries,
     /// Not as many entries as were announced, or none were.
     OutOfOrder,
-    /// What was read back is not what was written.
+    /// The words that were read back are not those that were written.
     ReadBack,
     /// The flash reports an error.
     Flash(NorFlashErrorKind),
@@ -121,7 +121,7 @@ type Result<T> = core::result::Result<T, StoreError>;
 struct Writing {
     set: Set,
     entries_left: usize,
-    /// Where the next word goes.
+    /// The place of the next word.
     next: u32,
     checksum: Checksum,
 }

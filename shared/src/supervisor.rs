@@ -56,7 +56,7 @@ impl Mode {
     /// Every mode.
     pub const ALL: [Self; 5] = [Self::Disarmed, Self::Armed, Self::Grasping, Self::Releasing, Self::Fault];
 
-    /// Whether the amplifiers have power in it.
+    /// Returns `true` if the amplifiers have power in it.
     pub const fn is_powered(self) -> bool {
         match self {
             Self::Disarmed | Self::Fault => false,
@@ -76,7 +76,7 @@ impl Mode {
     }
 }
 
-/// What may happen in a mode: the commands, and what the tick itself notices.
+/// An event in a mode: the commands, and what the tick itself notices.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Event {
     /// A command.
@@ -87,7 +87,7 @@ pub enum Event {
     Released,
 }
 
-/// What an event leads to.
+/// The outcome of an event.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Outcome {
     /// The mode after it, which may be the one before.
@@ -112,7 +112,7 @@ const TABLE: [[Outcome; 8]; 5] = {
     ]
 };
 
-/// What an event leads to in a mode.
+/// Returns the outcome of an event in a mode.
 pub fn outcome(mode: Mode, event: Event) -> Outcome {
     let column = match event {
         Event::Command(command) => match command {
@@ -189,7 +189,7 @@ impl Ramp {
     }
 }
 
-/// What the joints are driven by in a tick.
+/// The source of the joints' torques in a tick.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Drive {
     /// Nothing: no torque.
@@ -214,7 +214,7 @@ pub struct Supervisor {
     age: u32,
     /// Ticks until the amplifiers have started.
     starting: u32,
-    /// How far the soft start had come when the release began, in ticks of grasping.
+    /// The progress of the soft start when the release began, in ticks of grasping.
     grasped: u32,
 }
 
@@ -303,7 +303,7 @@ impl Supervisor {
         self.fault = self.fault.or(Some(raised));
     }
 
-    /// What drives the joints in this tick.
+    /// Returns the source of the joints' torques in this tick.
     pub fn drive(&self, ramps: &Ramps) -> Drive {
         match self.mode {
             Mode::Disarmed | Mode::Fault => Drive::Off,
@@ -322,7 +322,7 @@ impl Supervisor {
         }
     }
 
-    /// Whether the force is on its way up or down, so that torques change with it.
+    /// Returns `true` if the force is on its way up or down, so that torques change with it.
     pub fn ramps(&self, ramps: &Ramps) -> bool {
         match self.mode {
             Mode::Disarmed | Mode::Armed | Mode::Fault => false,

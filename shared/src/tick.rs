@@ -42,7 +42,7 @@ pub struct Config<const J: usize> {
     pub laws: LawsConfig<f32, J>,
     /// Limits.
     pub limits: LimitConfig<J>,
-    /// Where faults begin.
+    /// Thresholds of the faults.
     pub faults: FaultConfig<J>,
     /// Times of grasping and releasing.
     pub supervisor: SupervisorConfig,
@@ -52,7 +52,7 @@ pub struct Config<const J: usize> {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Params<const J: usize, const F: usize> {
     hand: Hand<f32, J, F>,
-    /// What the hand's file says: how far the line may go.
+    /// The configuration in the hand's file: how far the line may go.
     file: Config<J>,
     /// The parameters that differ from it, a bit for each.
     pub(crate) changed: u64,
@@ -146,18 +146,18 @@ impl<const J: usize, const F: usize> Params<J, F> {
     }
 }
 
-/// What a tick takes in.
+/// The inputs of a tick.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Input<'a, const J: usize> {
-    /// What is known of the joints.
+    /// The state of the joints.
     pub sensed: Sensed<'a, J>,
-    /// What else happened.
+    /// The other events.
     pub events: Events,
-    /// What the user asks for.
+    /// The command of the user.
     pub command: Option<Command>,
 }
 
-/// What is known of the joints in a tick.
+/// The state of the joints as a tick gets it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Sensed<'a, const J: usize> {
     /// Encoder counts.
@@ -171,10 +171,10 @@ pub enum Sensed<'a, const J: usize> {
     },
     /// Nothing, because the joints could not be read or driven. The estimator starts anew with the next counts.
     Failed(Raised),
-    /// What joints that failed would begin with now: they have passed their self-test since, and wait for the fault to be
-    /// cleared.
+    /// The reading that joints which failed would begin with now: they have passed their self-test since, and wait for
+    /// the fault to be cleared.
     Tested {
-        /// Why they failed.
+        /// The failure.
         raised: Raised,
         /// Encoder counts.
         counts: &'a [i32; J],
@@ -204,14 +204,14 @@ impl<'a, const J: usize> Input<'a, J> {
     }
 }
 
-/// What a tick puts out.
+/// The outputs of a tick.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Output<const J: usize> {
     /// Torques of the next tick, N m; zero beyond the hand's joints.
     pub torques_nm: [f32; J],
-    /// Whether the amplifiers have power in it.
+    /// `true` if the amplifiers have power in it.
     pub powered: bool,
-    /// What there is to tell.
+    /// The record of the tick.
     pub record: Record<J>,
 }
 
@@ -362,7 +362,7 @@ fn watch<const J: usize, const F: usize>(
     low.or(sensed).or(late).or(frozen).or(lost)
 }
 
-/// Why a command can't be done even in a mode that takes it.
+/// Returns the reason for which a command can't be done even in a mode that takes it.
 fn object<const J: usize, const F: usize>(
     params: &Params<J, F>,
     state: &State<J, F>,
@@ -395,18 +395,18 @@ fn object<const J: usize, const F: usize>(
     }
 }
 
-/// How firmly a command wants to grasp.
+/// Returns the gains that a command asks for.
 fn gains<const J: usize, const F: usize>(params: &Params<J, F>, grasp: Grasp) -> PerGain<f32> {
     params.prepared.laws.gains().zip_with(&grasp.gains, |&configured, asked| asked.unwrap_or(configured))
 }
 
-/// What the joints are to be given, and why.
+/// The torques of the joints, and their reasons.
 struct Action<const J: usize> {
     torques_nm: [f32; J],
     limiting: [Limiting; J],
     /// A torque that is not a finite number.
     not_finite: Option<Raised>,
-    /// What the laws say; `None` without torque.
+    /// The laws' account; `None` without torque.
     account: Option<Account<f32>>,
 }
 

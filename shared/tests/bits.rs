@@ -88,8 +88,8 @@ fn run<const J: usize, const F: usize>(config: &Config<J>) -> (Fnv, Fnv, [u32; 5
     (torques, records, ticks_in)
 }
 
-/// If this fails without a change to what the tick computes, bit equality is lost. If what it computes was meant to
-/// change, so are the hashes. That of the torques outlives a record that tells more.
+/// A failure without a change to the tick's computations means that bit equality is lost. If what it computes was meant
+/// to change, so are the hashes. That of the torques outlives a record that tells more.
 #[test]
 fn the_bits_are_those_of_every_other_machine() {
     let (torques, records, ticks_in) = run::<12, 3>(&config());
@@ -106,7 +106,7 @@ fn earlier<const J: usize>() -> Config<J> {
     config
 }
 
-/// What is compiled for the microcontroller is compared with the host in `tests/tests/pil.rs`.
+/// The image for the microcontroller is compared with the host in `tests/tests/pil.rs`.
 #[test]
 fn the_bits_of_the_earlier_law_are_those_of_every_other_machine() {
     let (torques, records, ticks_in) = run::<12, 3>(&earlier());

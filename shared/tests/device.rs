@@ -90,7 +90,7 @@ impl Bench {
         self.tick(Some(packet)).reply.expect("every request is answered")
     }
 
-    /// What a request is refused for.
+    /// Returns the refusal of a request.
     #[track_caller]
     fn refused(&mut self, request: Request<12>) -> Option<Refusal> {
         match self.ask(request) {
@@ -560,7 +560,7 @@ proptest! {
     }
 }
 
-/// What a request asks for, and its answer.
+/// Asks for full records, and takes the answer.
 fn full(bench: &mut Bench, decimation: u16) {
     bench.done(Request::Telemetry { decimation, signals: Signals::FULL });
 }

@@ -1,5 +1,5 @@
-//! What no request can do: make a limit looser than the hand's file, arm without a heartbeat, make a torque jump, leave a fault
-//! by itself.
+//! The limits that no request can break: make a limit looser than the hand's file, arm without a heartbeat, make a
+//! torque jump, leave a fault by itself.
 
 mod common;
 

@@ -26,7 +26,7 @@ impl Lcg {
     }
 }
 
-/// What a tick takes in.
+/// The inputs of a tick.
 struct Step {
     counts: [i32; 12],
     failed: Option<Raised>,

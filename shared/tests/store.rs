@@ -52,7 +52,7 @@ fn entries(random: &mut Random, count: usize) -> Vec<Entry> {
     (0..count).map(|_| Entry { key: word(), index: word() as u8, value: f32::from_bits(word()) }).collect()
 }
 
-/// What is promised of saved parameters.
+/// The promise for saved parameters.
 #[test]
 fn ten_thousand_saves_cut_at_a_random_byte_leave_the_old_or_the_new_set() {
     let mut random = Random::new(13);
@@ -92,7 +92,7 @@ fn ten_thousand_saves_cut_at_a_random_byte_leave_the_old_or_the_new_set() {
     assert!(cut_starts > 1000 && of_the_new > 0 && round - cut_starts > 10_100);
 }
 
-/// What a cut leaves does no harm later.
+/// The remains of a cut do no harm later.
 #[test]
 fn after_every_byte_of_a_save_the_next_one_works() {
     let mut random = Random::new(2);

@@ -24,7 +24,7 @@ impl Gain {
     }
 }
 
-/// What is told each tick.
+/// A value that is told each tick.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Signal {
     /// Its name in recordings and tables, with its unit.
@@ -35,7 +35,7 @@ pub struct Signal {
     pub words: &'static str,
 }
 
-/// How a gain comes and goes with a grasp.
+/// The ramp of a gain at the beginning and the end of a grasp.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Ramp {
     /// It grows over the soft start, so that fingers do not hammer the object, and falls over the release.

@@ -1,5 +1,5 @@
-//! What acts whenever the hand has torque, with a grasp or without: the damping `-C dq` and the weight of the links `g(q)`
-//! (the parts of Eq. 29 that no law has for its own).
+//! The torques that act whenever the hand has torque, with a grasp or without: the damping `-C dq` and the weight of
+//! the links `g(q)` (the parts of Eq. 29 that no law has for its own).
 
 use crate::hand::{Hand, Posture};
 use crate::math::Real;

@@ -26,7 +26,7 @@ use serde::{Deserialize, Serialize};
 /// Its module has tables of both, `GAINS` and `SIGNALS`, and its [latch](Self::Latch) under that name, with `save` and
 /// `load` for snapshots.
 pub trait Law<T: Real, const J: usize, const F: usize, const GAINS: usize, const SIGNALS: usize> {
-    /// What it remembers of the hand from the moment in which a grasp begins.
+    /// Its memory of the hand at the moment in which a grasp begins.
     type Latch;
 
     /// Returns the law, prepared for a hand.
@@ -45,18 +45,18 @@ pub trait Law<T: Real, const J: usize, const F: usize, const GAINS: usize, const
     ) -> Effect<T, GAINS, SIGNALS>;
 }
 
-/// How the hand stands.
+/// The state of the hand in a tick.
 #[derive(Clone, Copy, Debug)]
 pub struct Stance<'a, T, const J: usize, const F: usize> {
     /// The hand.
     pub hand: &'a Hand<T, J, F>,
-    /// Where its links are.
+    /// The poses of its links.
     pub posture: &'a Posture<T, J, F>,
     /// Joint angles that lead there, rad.
     pub angles_rad: &'a [T; J],
 }
 
-/// What a law says of its torques.
+/// The result of a law beside its torques.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Effect<T, const GAINS: usize, const SIGNALS: usize> {
     /// The potential of each gain, J.
@@ -209,7 +209,7 @@ macro_rules! laws {
             };
         }
 
-        /// What the laws remember from the moment in which a grasp began.
+        /// The memory of all laws of the moment in which a grasp began.
         #[derive(Clone, Copy, Debug, PartialEq)]
         pub struct Latch<T, const J: usize, const F: usize> {
             $(#[doc = concat!("What ", $words, " remembers.")] pub $law: $law::Latch<T, J, F>,)*
@@ -297,7 +297,7 @@ impl Chosen {
     /// None of them.
     pub const NONE: Self = Self(0);
 
-    /// Whether the law of this number is chosen.
+    /// Returns `true` if the law of this number is chosen.
     pub const fn has(self, law: u8) -> bool {
         self.0 >> law & 1 != 0
     }
@@ -317,7 +317,7 @@ pub struct LawsConfig<T, const J: usize> {
     pub gains: PerGain<T>,
     /// Laws that may act.
     pub chosen: Chosen,
-    /// What acts with every law and without.
+    /// The torques that act with every law and without.
     pub hold: Hold<T, J>,
 }
 
@@ -341,13 +341,13 @@ impl<T: Real, const J: usize> LawsConfig<T, J> {
 /// A grasp, as it is in this tick.
 #[derive(Clone, Copy, Debug)]
 pub struct Grip<'a, T, const J: usize, const F: usize> {
-    /// What the laws remember of its beginning.
+    /// The memory of the laws of its beginning.
     pub latch: &'a Latch<T, J, F>,
     /// The gains that act.
     pub gains: PerGain<T>,
 }
 
-/// What the laws know about themselves without seeing the object.
+/// The laws' own account, which needs no knowledge of the object.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Account<T> {
     /// The gains that act.

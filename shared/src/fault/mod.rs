@@ -1,4 +1,4 @@
-//! What can be wrong: numbered faults; and, in `watch`, what finds them.
+//! Numbered faults, and what finds them (`watch`).
 //!
 //! A fault takes all torque away in the tick that finds it; only the loss of the link lets the object go slowly first.
 //! It is kept until it is cleared; the one that came first is the one that is reported. A fault's number never changes
@@ -33,22 +33,22 @@ macro_rules! faults {
                 self as u8
             }
 
-            /// What is done about it at once.
+            /// Returns the reaction to it at once.
             pub const fn reaction(self) -> Reaction {
                 match self { $(Self::$name => Reaction::$reaction,)* }
             }
 
-            /// What is wrong, in words.
+            /// Returns the fault, in words.
             pub const fn words(self) -> &'static str {
                 match self { $(Self::$name => $words,)* }
             }
 
-            /// How it is found, and how soon.
+            /// Returns how it is found, and how soon.
             pub const fn found(self) -> &'static str {
                 match self { $(Self::$name => $found,)* }
             }
 
-            /// What to do.
+            /// Returns the remedy.
             pub const fn remedy(self) -> &'static str {
                 match self { $(Self::$name => $remedy,)* }
             }
@@ -61,7 +61,7 @@ macro_rules! faults {
     };
 }
 
-/// What is done about a fault in the tick that finds it.
+/// The reaction to a fault in the tick that finds it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Reaction {
     /// The torque is taken away.

@@ -9,7 +9,7 @@ use crate::math::Real;
 use crate::parameter::ParameterError;
 use crate::period::Period;
 
-/// Where faults begin, as a user says; `None` leaves one out.
+/// Thresholds of the faults, as a user says; `None` leaves one out.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FaultConfig<const J: usize> {
     /// Speed that each joint can't reach, rad/s: a count that changes faster is wrong. The motor's no-load speed over
@@ -17,9 +17,9 @@ pub struct FaultConfig<const J: usize> {
     pub possible_speed_rad_s: Option<[f32; J]>,
     /// Speed that each joint must not reach, rad/s. Not the difference of two counts but the filtered speed is meant.
     pub speed_limit_rad_s: Option<[f32; J]>,
-    /// How far a joint may be beyond its range, rad.
+    /// Largest angle of a joint beyond its range, rad.
     pub range_slack_rad: Option<f32>,
-    /// How long a torque may stay at its limit, ms.
+    /// Longest time for which a torque may stay at its limit, ms.
     pub saturated_ms: Option<u32>,
     /// Change of the torque since the last count that is too much for a joint that stands still, N m: well above its
     /// friction. A counter that stands still is not believed when this changes, and a neighbour turns, for the time below. A
@@ -32,9 +32,9 @@ pub struct FaultConfig<const J: usize> {
     pub frozen_neighbour_rad: Option<f32>,
     /// Shortest standstill that counts, ms.
     pub frozen_ms: Option<u32>,
-    /// How long the host's heartbeat may fail while the hand has torque, ms.
+    /// Longest time for which the host's heartbeat may be missing while the hand has torque, ms.
     pub heartbeat_ms: Option<u32>,
-    /// How many ticks in a row may be late; on average one in ten.
+    /// Most ticks in a row that may be late; on average one in ten.
     pub late_ticks: Option<u32>,
     /// Work that the joints may do in a second beyond the drop of the law's potentials, J (the excess of the
     /// [`ledger`](crate::ledger), which fades: of what was done a second ago, 1/e counts).
@@ -139,7 +139,7 @@ impl<const J: usize> FaultConfig<J> {
     }
 }
 
-/// What a late tick counts; one in time takes one off.
+/// Weight of a late tick; one in time takes one off.
 const LATE_WEIGHT: u32 = 10;
 /// Most late ticks in a row that can be allowed.
 const LATE_TICKS_MOST: u32 = 1000;
@@ -157,7 +157,7 @@ pub struct Watch<const J: usize> {
     energy_j: Option<f32>,
 }
 
-/// What the watch remembers from tick to tick.
+/// The watch's memory from tick to tick.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Watched<const J: usize> {
     /// For how many ticks each joint has been at its torque limit.
@@ -171,7 +171,7 @@ pub struct Watched<const J: usize> {
     late_ticks: u32,
 }
 
-/// What the torques of a tick come from, as far as a counter that stands still is concerned.
+/// The origin of a tick's torques, as far as a counter that stands still is concerned.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Driven {
     /// Not the grasp law: what the joints do is not its doing.
@@ -188,12 +188,12 @@ struct Standstill {
     ticks: u32,
     /// Torque when it last moved, or when the force last changed, N m.
     torque_nm: f32,
-    /// Where the neighbours were then, rad.
+    /// The neighbours' angles at that time, rad.
     before_rad: f32,
     after_rad: f32,
 }
 
-/// Where the faults of one joint begin. What is left out begins beyond all finite numbers.
+/// Thresholds of the faults of one joint. What is left out begins beyond all finite numbers.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct JointWatch {
     /// Change of the count in a tick.
@@ -312,7 +312,7 @@ impl<const J: usize> Watch<J> {
         self.silent(watched)
     }
 
-    /// Whether the heartbeat fails.
+    /// Returns `true` if the heartbeat fails.
     pub fn silent(&self, watched: &Watched<J>) -> bool {
         self.heartbeat_ticks.is_some_and(|longest| watched.silent > longest)
     }
@@ -330,7 +330,7 @@ impl<const J: usize> Watch<J> {
         (watched.late > most).then_some(Raised::of_hand(Fault::TickLate))
     }
 
-    /// Whether the ledger's excess is more than it may be.
+    /// Returns the fault of a ledger whose excess is more than it may be.
     pub fn energy(&self, energy_j: f32) -> Option<Raised> {
         let most = self.energy_j?;
         (!(energy_j <= most)).then_some(Raised::of_hand(Fault::TooMuchEnergy))

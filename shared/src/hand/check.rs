@@ -1,4 +1,4 @@
-//! What makes a description a hand: the first thing that is wrong, with the joint or fingertip that it is wrong with.
+//! The check of a hand's description: the first thing that is wrong, with the joint or fingertip that it is wrong with.
 
 use super::model::{Fingertip, HandError, Joint};
 use crate::math::{Real, norm};
@@ -23,7 +23,8 @@ pub(super) fn check_counts<const J: usize, const F: usize>(
     Ok(())
 }
 
-/// How far a given unit vector, rotation or symmetric tensor may be from one: file formats print six digits.
+/// Returns the largest difference of a given unit vector, rotation or symmetric tensor from a true one: file formats
+/// print six digits.
 fn tolerance<T: Real>() -> T {
     T::from_f64(1e-5)
 }

@@ -13,7 +13,7 @@ use super::model::Hand;
 use crate::math::Real;
 use nalgebra::{Matrix3, SMatrix, Vector3};
 
-/// Where a link is, in the base frame.
+/// The pose of a link in the base frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LinkPose<T> {
     /// The joint, and the origin of the link frame, m.
@@ -36,7 +36,7 @@ impl<T: Real> LinkPose<T> {
     }
 }
 
-/// Where everything is for one set of joint angles.
+/// The poses of all links for one set of joint angles.
 ///
 /// Joints are kept in the axes of their planar chain, where they only turn in the plane; [`link`](Self::link) puts the
 /// pose of a link in the base frame together.
@@ -52,7 +52,7 @@ pub struct Posture<T, const J: usize, const F: usize> {
     pub attitudes: [Matrix3<T>; F],
 }
 
-/// Where a joint is within its planar chain.
+/// The pose of a joint within its planar chain.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct JointPose<T> {
     /// First joint of the chain.
@@ -84,7 +84,7 @@ impl<T: Real, const J: usize, const F: usize> Posture<T, J, F> {
         }
     }
 
-    /// Where a link is; the base, for a joint that the hand has not.
+    /// Returns the pose of a link; the base, for a joint that the hand has not.
     #[inline]
     pub fn link(&self, joint: usize) -> LinkPose<T> {
         match self.at(joint) {

@@ -1,4 +1,4 @@
-//! What a hand is: joints, links and fingertips, checked and prepared once.
+//! A hand: joints, links and fingertips, checked and prepared once.
 
 use super::check::{check_counts, check_fingertip, check_joint};
 use crate::array::{self, Item};
@@ -24,7 +24,7 @@ pub struct Link<T> {
 pub struct Joint<T> {
     /// Index of the parent link's joint, smaller than this joint's own; `None` for the base.
     pub parent: Option<usize>,
-    /// Where the joint (and the origin of its link frame) sits in the parent's link frame, m.
+    /// Position of the joint (and of the origin of its link frame) in the parent's link frame, m.
     pub offset_m: Vector3<T>,
     /// Axes of the link frame at zero angle, in the parent's link frame; a rotation.
     pub attitude: Matrix3<T>,
@@ -50,28 +50,28 @@ pub struct Fingertip<T> {
     pub radius_m: T,
 }
 
-/// Why a description is not a hand. The message names the joint or fingertip by its index.
+/// An error in the description of a hand. The message names the joint or fingertip by its index.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum HandError {
     /// The hand has no joint.
     NoJoints,
     /// The hand has fewer than two fingertips, and nothing to press against.
     TooFewFingertips {
-        /// How many there are.
+        /// Their number.
         count: usize,
     },
     /// More joints than the capacity.
     TooManyJoints {
-        /// How many there are.
+        /// Their number.
         count: usize,
-        /// How many there may be.
+        /// The most that there may be.
         capacity: usize,
     },
     /// More fingertips than the capacity.
     TooManyFingertips {
-        /// How many there are.
+        /// Their number.
         count: usize,
-        /// How many there may be.
+        /// The most that there may be.
         capacity: usize,
     },
     /// A joint's parent does not come before it.
@@ -85,7 +85,7 @@ pub enum HandError {
         joint: usize,
         /// The parameter.
         parameter: &'static str,
-        /// What it has to be.
+        /// The requirement.
         reason: &'static str,
     },
     /// A joint moves no fingertip.
@@ -99,7 +99,7 @@ pub enum HandError {
         fingertip: usize,
         /// The parameter.
         parameter: &'static str,
-        /// What it has to be.
+        /// The requirement.
         reason: &'static str,
     },
 }
@@ -133,8 +133,8 @@ impl fmt::Display for HandError {
 
 impl core::error::Error for HandError {}
 
-/// How the axes of a planar chain lie against those of the link that it starts from, by the angles of Denavit and
-/// Hartenberg: turned about z until x is the common normal of both joint axes, then twisted about x.
+/// The attitude of the axes of a planar chain against those of the link that it starts from, by the angles of Denavit
+/// and Hartenberg: turned about z until x is the common normal of both joint axes, then twisted about x.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(bound = "T: Real")]
 pub struct Bend<T> {
@@ -157,7 +157,7 @@ pub struct Bend<T> {
 pub struct PreparedJoint<T> {
     /// Index of the parent link's joint, smaller than this joint's own; `None` for the base.
     pub parent: Option<usize>,
-    /// How the joint starts a chain; `None` for a joint that continues the chain of the joint before it, its parent.
+    /// The start of a chain; `None` for a joint that continues the chain of the joint before it, its parent.
     pub bend: Option<Bend<T>>,
     /// From the parent's origin to this joint's, in the prepared frame at zero angle, m.
     pub offset_m: Vector3<T>,
@@ -188,7 +188,7 @@ pub struct Hand<T, const J: usize, const F: usize> {
     pub(super) fingertips: [Fingertip<T>; F],
 }
 
-/// What is written of a hand. What was computed is believed when it is read, the tree is checked.
+/// The parts of a hand that are written. What was computed is believed when it is read, the tree is checked.
 #[derive(Deserialize)]
 #[serde(bound = "T: Real")]
 struct Parts<T, const J: usize, const F: usize> {
@@ -357,7 +357,7 @@ impl<T: Real, const J: usize, const F: usize> Hand<T, J, F> {
         self.joints.get(joint).map_or(Vector3::zeros(), |joint| joint.offset_m)
     }
 
-    /// Whether a joint lies between the base and a fingertip.
+    /// Returns `true` if a joint lies between the base and a fingertip.
     pub fn moves(&self, joint: usize, fingertip: usize) -> bool {
         self.joints_to(fingertip).any(|k| k == joint)
     }
@@ -464,8 +464,8 @@ fn cast<T: Real, U: Real>(v: &Vector3<T>) -> Vector3<U> {
     v.map(|v| U::from_f64(v.to_f64()))
 }
 
-/// Whether a unit vector is z, but for rounding: axes that a file gives as parallel differ by some once they went
-/// through a rotation or two.
+/// Returns `true` if a unit vector is z, but for rounding: axes that a file gives as parallel differ by some once they
+/// went through a rotation or two.
 fn is_z<T: Real>(axis: &Vector3<T>) -> bool {
     let rounding = T::from_f64(if T::from_f64(1.0 + 1e-9) == T::one() { 1e-6 } else { 1e-14 });
     axis.z > T::zero() && axis.x.magnitude() <= rounding && axis.y.magnitude() <= rounding

@@ -14,14 +14,14 @@
 
 use crc::{CRC_32_ISO_HDLC, Crc, Table};
 
-/// What the payload is thought to be preceded by.
+/// The bytes that are taken to precede the payload.
 const LEAD: &[u8] = b"blindgrasp";
 
 const ISO_HDLC: Crc<u32, Table<1>> = Crc::<u32, Table<1>>::new(&CRC_32_ISO_HDLC);
 
-/// What each byte does to the register: 1 KiB, 1 % of the flash, and 4 instructions a byte on a Cortex-M4, a word at a time.
-/// Sixteen entries (64 bytes) take 8; no table, 40. The record of twelve joints that goes out with a tick has some 140
-/// bytes, so that this saves 560 and 5,000 instructions a tick.
+/// The effect of each byte on the register: 1 KiB, 1 % of the flash, and 4 instructions a byte on a Cortex-M4, a word
+/// at a time. Sixteen entries (64 bytes) take 8; no table, 40. The record of twelve joints that goes out with a tick
+/// has some 140 bytes, so that this saves 560 and 5,000 instructions a tick.
 static TABLE: [u32; 256] = ISO_HDLC.table()[0];
 
 /// The register of a CRC in work. It is advanced by bytes, not by slices, so that each byte costs the same.
@@ -67,8 +67,8 @@ impl Checksum {
         (self.0 ^ CRC_32_ISO_HDLC.xorout).to_le_bytes()
     }
 
-    /// Whether what it was advanced by is a payload and its CRC. The register is then the same for all payloads, so that
-    /// a receiver need not know where the payload ends before the frame has ended.
+    /// Returns `true` if what it was advanced by is a payload and its CRC. The register is then the same for all
+    /// payloads, so that a receiver need not know where the payload ends before the frame has ended.
     pub(super) fn is_of_payload_and_crc(self) -> bool {
         self.0 == CRC_32_ISO_HDLC.residue
     }

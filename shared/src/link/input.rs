@@ -11,7 +11,7 @@ use crate::fault::Raised;
 use crate::telemetry::{List, Record};
 use serde::{Deserialize, Serialize};
 
-/// What a tick took in, and the [`digest`](Record::digest) of its record.
+/// The inputs of a tick, and the [`digest`](Record::digest) of its record.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct InputRecord<const J: usize> {
     /// Number of the record, in one row with full ones.
@@ -20,9 +20,9 @@ pub struct InputRecord<const J: usize> {
     pub tick: u32,
     /// The command of this tick, and what became of it.
     pub answer: Option<Answer>,
-    /// What else came from outside in this tick.
+    /// The other events from outside in this tick.
     pub events: Events,
-    /// Why there are no counts, where the joints could not be read.
+    /// The failure of the joints, in place of counts.
     pub reading_failed: Option<Raised>,
     /// Encoder counts, one a joint.
     pub counts: List<i32, J>,
@@ -85,7 +85,8 @@ mod tests {
         }
     }
 
-    /// What a host finds when it computes the tick again, it finds by the digest; what only the sender knows is not in it.
+    /// The digest tells a host every bit that it computes otherwise than the hand; what only the sender knows is not in
+    /// it.
     #[test]
     fn every_bit_that_a_tick_computes_is_in_the_digest() {
         let whole = record();

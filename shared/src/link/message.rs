@@ -1,4 +1,4 @@
-//! What is said over the link: requests of the host, replies of the device.
+//! The messages of the link: requests of the host, replies of the device.
 //!
 //! - A **session** begins with `Hello`, whose answer carries its number; everything else carries that number, and a
 //!   sequence number that grows (modulo 2^16). What is replayed, or comes out of order, is refused. `Stop` is
@@ -26,11 +26,11 @@ pub struct Packet<const J: usize> {
     pub session: u16,
     /// Number of the request.
     pub sequence: u16,
-    /// What is asked for.
+    /// The request.
     pub request: Request<J>,
 }
 
-/// What the host can ask for.
+/// A request of the host.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Request<const J: usize> {
     /// Begin a session: who are you? Stays the first for ever.
@@ -44,7 +44,7 @@ pub enum Request<const J: usize> {
     Heartbeat,
     /// Set a parameter, while the hand is disarmed.
     SetParameter {
-        /// Which.
+        /// The parameter.
         parameter: Parameter,
         /// Of which joint or axis.
         index: u8,
@@ -53,7 +53,7 @@ pub enum Request<const J: usize> {
     },
     /// Tell a parameter.
     GetParameter {
-        /// Which.
+        /// The parameter.
         parameter: Parameter,
         /// Of which joint or axis.
         index: u8,
@@ -62,29 +62,29 @@ pub enum Request<const J: usize> {
     Telemetry {
         /// One in so many ticks; 0 for none.
         decimation: u16,
-        /// What is in them.
+        /// The signals in them.
         signals: Signals,
     },
     /// The joints of a hand that is elsewhere: do one tick with them. Only the image `pil` does.
     Joints(Sample<J>),
     /// A record of the burst around the last fault.
     Burst {
-        /// Which; 0 is the oldest.
+        /// The number of the record; 0 is the oldest.
         index: u16,
     },
     /// End the session, and send no more records. The line has its first rate once the answer has left.
     Goodbye,
     /// Give the line another rate, once the answer has left; or: are you heard at this one? While the hand is disarmed.
     Rate {
-        /// Which.
+        /// The rate.
         baud: u32,
     },
     /// The joints stand at angle zero: set their zeros so, while the hand is disarmed.
     Zero {
-        /// Which joint; `None` for all.
+        /// The joint; `None` for all.
         joint: Option<u8>,
     },
-    /// What is read with the signs and zeros that were set is right: the hand may be armed.
+    /// The readings with the signs and zeros that were set are right: the hand may be armed.
     Confirm,
     /// Save the parameters that differ from the hand's file, while the hand is disarmed.
     Save,
@@ -93,7 +93,8 @@ pub enum Request<const J: usize> {
 }
 
 impl<const J: usize> Request<J> {
-    /// Whether it has to wait until a save is over: it would change what is saved, or move the hand meanwhile.
+    /// Returns `true` if it has to wait until a save is over: it would change what is saved, or move the hand
+    /// meanwhile.
     pub fn is_to_wait_for_a_save(&self) -> bool {
         matches!(
             self,
@@ -111,13 +112,14 @@ impl<const J: usize> Request<J> {
 pub struct Sample<const J: usize> {
     /// Encoder counts.
     pub counts: List<i32, J>,
-    /// Why the joints could not be read or driven; with counts, they have passed their self-test since.
+    /// The failure of the joints, which could not be read or driven; with counts, they have passed their self-test
+    /// since.
     pub failed: Option<Raised>,
-    /// Whether the tick before is to count as late.
+    /// `true` if the tick before is to count as late.
     pub late: bool,
 }
 
-/// What of the telemetry is sent: a bit each.
+/// The parts of the telemetry that are sent: a bit each.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Signals(u8);
 
@@ -128,7 +130,7 @@ impl Signals {
     pub const COUNTS: Self = Self(1);
     /// Torques.
     pub const TORQUES: Self = Self(1 << 1);
-    /// What limits each joint.
+    /// The limit that acts on each joint.
     pub const LIMITING: Self = Self(1 << 2);
     /// Every part of a record.
     pub const ALL: Self = Self(0b111);
@@ -145,12 +147,12 @@ impl Signals {
         Self(self.0 | other.0)
     }
 
-    /// Whether all of some others are among them.
+    /// Returns `true` if all of some others are among them.
     pub const fn contain(self, other: Self) -> bool {
         self.0 & other.0 == other.0
     }
 
-    /// Whether there is a meaning to every bit.
+    /// Returns `true` if there is a meaning to every bit.
     pub const fn are_known(self) -> bool {
         Self::FULL.contain(self)
     }
@@ -171,7 +173,7 @@ impl<const J: usize> Record<J> {
     }
 }
 
-/// How a tick is told of.
+/// The form in which a tick is told.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Form {
     /// By its record, with these signals.
@@ -212,7 +214,7 @@ impl Form {
     }
 }
 
-/// What the device says.
+/// A reply of the device.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Reply<'a, const J: usize> {
     /// To `Hello`.
@@ -221,10 +223,10 @@ pub enum Reply<'a, const J: usize> {
         sequence: u16,
         /// Number of the session that begins.
         session: u16,
-        /// Who it is.
+        /// The identity of the device.
         #[serde(borrow)]
         identity: Identity<'a>,
-        /// Whether this ends another session in which something was asked for a moment ago.
+        /// `true` if this ends another session in which something was asked for a moment ago.
         ends_another: bool,
     },
     /// Done, or why not.
@@ -238,29 +240,29 @@ pub enum Reply<'a, const J: usize> {
     Value {
         /// Number of the request.
         sequence: u16,
-        /// Which.
+        /// The parameter.
         parameter: Parameter,
         /// Of which joint or axis.
         index: u8,
         /// Its value, and that of the hand's file.
         setting: Setting,
     },
-    /// What a tick did.
+    /// The record of a tick.
     Record(Record<J>),
     /// To `Burst`.
     Burst {
         /// Number of the request.
         sequence: u16,
-        /// Which record it is.
+        /// The number of the record.
         index: u16,
-        /// How many there are.
+        /// The number of records.
         count: u16,
         /// The record; it is numbered by its tick.
         record: Record<J>,
     },
     /// A part of a snapshot.
     Snapshot(Part),
-    /// What a tick took in.
+    /// The inputs of a tick.
     Input(InputRecord<J>),
 }
 

@@ -49,8 +49,8 @@ pub use frame::{encode, most_bytes};
 pub use input::InputRecord;
 pub use receiver::{Counters, FrameError, Receiver};
 
-/// Whether a tick may take a request while there is room for so many more answers: what is done is also answered. The last
-/// place is a stop's, so that it waits for one at most behind another stop, which has done the same.
+/// Returns `true` if a tick may take a request while there is room for so many more answers: what is done is also
+/// answered. The last place is a stop's, so that it waits for one at most behind another stop, which has done the same.
 pub const fn may_take(is_stop: bool, room: usize) -> bool {
     room > !is_stop as usize
 }

@@ -30,7 +30,8 @@ pub const TRIAL_MS: u32 = 200;
 pub const SILENCE_MS: u32 = 1000;
 /// Time in which a rate has to be answered before it is asked for again, ms: the hand has given up its trial by then.
 const ASK_MS: u32 = TRIAL_MS + 100;
-/// How often it is asked for. Of the next rate the first question is lost, while the hand still tries the one before.
+/// The number of times that it is asked for. Of the next rate the first question is lost, while the hand still tries
+/// the one before.
 const ASKS: u8 = 2;
 /// Time from one question at the new rate to the next, ms.
 const TRY_AGAIN_MS: u32 = 40;
@@ -45,7 +46,7 @@ pub struct HandRate {
     baud: u32,
     /// The host has not said yet that it is sure.
     is_on_trial: bool,
-    /// When the last good frame came.
+    /// The time of the last good frame.
     heard_ms: u32,
 }
 
@@ -84,7 +85,7 @@ impl Default for HandRate {
     }
 }
 
-/// What became of a question for a rate.
+/// The result of a question for a rate.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Asked {
     /// The hand changes to it, or has it.
@@ -101,11 +102,11 @@ pub type Wanted = [Option<u32>; FASTER_BAUDS.len()];
 /// The host's end.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct HostRate {
-    /// What is still to be asked for.
+    /// The rates that are still to be asked for.
     wanted: Wanted,
     baud: u32,
     state: State,
-    /// When the last good frame came, and when there was the last turn.
+    /// The times of the last good frame and of the last turn.
     heard_ms: u32,
     turned_ms: u32,
 }
@@ -139,7 +140,7 @@ impl HostRate {
         self.ask(now_ms);
     }
 
-    /// Whether nothing is to be agreed, so that other requests can be sent.
+    /// Returns `true` if nothing is to be agreed, so that other requests can be sent.
     pub fn is_settled(&self) -> bool {
         self.state == State::Settled
     }

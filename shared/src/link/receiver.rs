@@ -8,7 +8,7 @@ use super::{END, FULL};
 use core::fmt;
 use core::mem;
 
-/// Why bytes up to a 0x00 are not a frame.
+/// An error in the bytes up to a 0x00.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum FrameError {
     /// The frame is shorter than its CRC.

@@ -108,7 +108,8 @@ pub struct Reader {
     read: u32,
     /// Bytes that are known to have come.
     known: u32,
-    /// What had been read when that was found out: nothing behind it may be overwritten by the next look.
+    /// The number of bytes that had been read when that was found out: nothing behind it may be overwritten by the next
+    /// look.
     read_then: u32,
 }
 
@@ -183,7 +184,7 @@ impl<const N: usize> SendRing<N> {
         count
     }
 
-    /// Whether every byte was taken away.
+    /// Returns `true` if every byte was taken away.
     pub fn is_empty(&self) -> bool {
         self.written.load(Ordering::Relaxed) == self.sent.load(Ordering::Acquire)
     }
@@ -377,7 +378,7 @@ mod tests {
             }
         }
 
-        /// Where the program puts the bytes, it is the same ring.
+        /// The ring is the same when the program puts the bytes into it.
         #[test]
         fn bytes_that_are_put_are_read(pieces in proptest::collection::vec(0..=N, 0..50)) {
             let ring = ReceiveRing::<N>::new();

@@ -14,7 +14,7 @@ pub const AFTER: usize = 64;
 #[derive(Clone, Debug)]
 pub struct Burst<const J: usize> {
     ring: [Kept<J>; BEFORE + AFTER],
-    /// Where the next record goes; the oldest is there too, once the ring is full.
+    /// The place of the next record; the oldest is there too, once the ring is full.
     next: usize,
     /// Records in the ring.
     count: usize,
@@ -31,7 +31,7 @@ enum Phase {
     Kept,
 }
 
-/// Whether a burst can be read.
+/// A burst, as far as it can be read.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Caught<const J: usize> {
     /// No fault was caught since the hand was last armed.
@@ -42,7 +42,7 @@ pub enum Caught<const J: usize> {
     NoSuchRecord,
     /// A record.
     Record {
-        /// How many there are.
+        /// The number of records.
         count: u16,
         /// The one that was asked for.
         record: Record<J>,

@@ -1,4 +1,4 @@
-//! What the tick tells the world: one [`Record`] a tick, and its bytes.
+//! Telemetry of the tick: one [`Record`] a tick, and its bytes.
 //!
 //! - The **encoding** is postcard: fields in their order, without names; counts and numbers as variable-length
 //!   integers, `f32` as four bytes. It is positional, so that any change of [`Record`] or of a type in it is another

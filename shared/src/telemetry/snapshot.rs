@@ -17,7 +17,7 @@ pub const BYTES_PER_JOINT: usize = 144;
 pub struct Part {
     /// The state is that after this tick.
     pub tick: u32,
-    /// Where the bytes belong.
+    /// The place of the bytes.
     pub offset: u16,
     /// Bytes of the whole snapshot.
     pub length: u16,
@@ -55,7 +55,7 @@ impl<const J: usize> Outgoing<J> {
         self.sent = self.length;
     }
 
-    /// Whether all of it was taken.
+    /// Returns `true` if all of it was taken.
     pub(crate) fn is_over(&self) -> bool {
         self.sent >= self.length
     }

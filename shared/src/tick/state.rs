@@ -1,4 +1,4 @@
-//! What the tick remembers, and its bytes.
+//! The state of the tick, and its bytes.
 
 use super::Params;
 use crate::bytes::{BufferTooSmall, Loader, Saver, SnapshotError};
@@ -17,11 +17,11 @@ pub struct State<const J: usize, const F: usize> {
     pub(super) motion: Motion<J>,
     pub(super) supervisor: Supervisor,
     pub(super) watched: Watched<J>,
-    /// How firm this grasp is, when it is at its full force.
+    /// The gains of this grasp at its full force.
     pub(super) grasp: PerGain<f32>,
-    /// How the hand stood when the grasp began, while there is one.
+    /// The laws' memory of the beginning of the grasp, while there is one.
     pub(super) latch: Option<Latch<f32, J, F>>,
-    /// Where everything was in the last tick with torque.
+    /// The posture in the last tick with torque.
     pub(super) posture: Posture<f32, J, F>,
     /// Torques of the last tick, N m.
     pub(super) torques_nm: [f32; J],
@@ -70,7 +70,7 @@ impl<const J: usize, const F: usize> State<J, F> {
         self.supervisor.fault()
     }
 
-    /// How the hand stood when the grasp began, while there is one.
+    /// Returns the laws' memory of the beginning of the grasp, while there is one.
     pub fn latch(&self) -> Option<&Latch<f32, J, F>> {
         self.latch.as_ref()
     }

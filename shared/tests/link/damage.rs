@@ -7,7 +7,7 @@ use blindgrasp_shared::link::{Counters, FrameError, Receiver};
 
 const FRAMES: usize = if cfg!(debug_assertions) { 20_000 } else { 1_000_000 };
 
-/// What a frame carries: mostly what a hand and a host say to each other, at times more, at times more than is taken.
+/// Returns a payload: mostly what a hand and a host say to each other, at times more, at times more than is taken.
 fn payload(random: &mut Random) -> Vec<u8> {
     let length = match random.below(20) {
         0 => random.between(245, 262),

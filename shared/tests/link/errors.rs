@@ -1,4 +1,4 @@
-//! What the CRC promises, by exhaustion: errors of few bits, and bursts.
+//! The promises of the CRC, by exhaustion: errors of few bits, and bursts.
 
 use crate::property::{CAPACITY, checksum, crc32, frame, receive, stuff, unstuff, with_crc};
 use crate::random::Random;
@@ -34,7 +34,7 @@ fn errors_of_up_to_4_bits_are_found() {
     println!("{bits} bits of payload and CRC: {errors} errors of 1 or 2 bits, all with their own syndrome");
 }
 
-/// That the receiver has the CRC which the other tests reason about: short errors in payload and CRC, before stuffing.
+/// The receiver has the CRC which the other tests reason about: short errors in payload and CRC, before stuffing.
 #[test]
 fn short_bursts_before_stuffing_are_found() {
     let mut random = Random::new(1);

@@ -64,7 +64,7 @@ fn golden_bytes_of_full_blocks() {
     }
 }
 
-/// That no frame is longer is part of the property: buffers of this size suffice for every payload.
+/// The property includes that no frame is longer: buffers of this size suffice for every payload.
 #[test]
 fn some_payload_of_every_length_makes_the_longest_frame() {
     for length in 1..=LONGEST {

@@ -1,8 +1,8 @@
-//! What happens to frames on their way. Tests of the firmware in QEMU include this file, too.
+//! Damage to frames on their way. Tests of the firmware in QEMU include this file, too.
 
 use super::random::Random;
 
-/// What a line does to frames. Each makes a stretch of bytes of one or two frames.
+/// A kind of damage to frames. Each makes a stretch of bytes of one or two frames.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Damage {
     Noise,
@@ -35,7 +35,7 @@ impl Damage {
         Self::AddedZero,
     ];
 
-    /// What becomes of a frame; `other` is a second one. It may happen that nothing does.
+    /// Returns the bytes that a frame becomes; `other` is a second one. It may happen that nothing does.
     pub(crate) fn of(self, random: &mut Random, intact: &[u8], other: &[u8]) -> Vec<u8> {
         let mut bytes = intact.to_vec();
         let at = random.below(bytes.len());

@@ -1,4 +1,4 @@
-//! What holds for the link whatever the bytes: one function for the bounded tests here and for the fuzzer, which
+//! Properties of the link that hold for any bytes: one function for the bounded tests here and for the fuzzer, which
 //! includes this file.
 //!
 //! The receiver is compared with a second one that is as plain as possible: it has the whole frame, allocates, and
@@ -73,7 +73,7 @@ pub(crate) fn stuff(bytes: &[u8]) -> Vec<u8> {
     stuffed
 }
 
-/// What COBS stands for, without the 0x00, and whether the last block is cut short.
+/// Returns the bytes that COBS stands for, without the 0x00, and `true` if the last block is cut short.
 pub(crate) fn unstuff(mut stuffed: &[u8]) -> (Vec<u8>, bool) {
     let (mut bytes, mut cut_short) = (Vec::new(), false);
     while let Some((code, rest)) = stuffed.split_first() {
@@ -89,7 +89,7 @@ pub(crate) fn unstuff(mut stuffed: &[u8]) -> (Vec<u8>, bool) {
     (bytes, cut_short)
 }
 
-/// What a receiver must make of the bytes between two 0x00.
+/// Returns the result that a receiver must have for the bytes between two 0x00.
 fn judge(stuffed: &[u8]) -> Result<Vec<u8>, FrameError> {
     let (bytes, cut_short) = unstuff(stuffed);
     if bytes.len() > CAPACITY {

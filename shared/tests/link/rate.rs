@@ -9,7 +9,7 @@ use std::collections::VecDeque;
 /// From one heartbeat of the host to the next, ms.
 const HEARTBEAT_MS: u32 = 50;
 
-/// What the hand's firmware is like.
+/// The firmware of the hand.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Firmware {
     /// It has some rates besides the first.
@@ -20,7 +20,7 @@ enum Firmware {
     IsSilent,
 }
 
-/// What happens to the line from some time on, for some time.
+/// A disturbance of the line from some time on, for some time.
 #[derive(Clone, Copy, Debug)]
 struct Disturbance {
     begin_ms: u32,
@@ -57,7 +57,7 @@ struct World {
     /// Rate that the hand changes to, once what it sends now has left.
     leaving: Option<u32>,
     beaten_ms: u32,
-    /// When a heartbeat came, and when its answer.
+    /// The times of the last heartbeat and of its answer.
     hand_heard_ms: Option<u32>,
     host_heard_ms: Option<u32>,
     /// Every rate that the hand has had, in order.
