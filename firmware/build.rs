@@ -25,9 +25,9 @@ type Result<T> = std::result::Result<T, Box<dyn Error>>;
 
 const CRC: Crc<u32> = Crc::<u32>::new(&CRC_32_ISO_HDLC);
 const DEFAULT_HAND: &str = "models/hands/three-finger.toml";
-/// Where the sources of an image are.
+/// Folders with the sources of an image.
 const FOLDERS: [&str; 2] = ["firmware/src", "shared/src"];
-/// What else decides about an image.
+/// Other files that an image is made from.
 const FILES: [&str; 6] = [
     ".cargo/config.toml",
     "Cargo.lock",

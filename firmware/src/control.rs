@@ -13,7 +13,7 @@ use blindgrasp_shared::telemetry::burst::Burst;
 /// The records around a fault.
 pub type HandBurst = Burst<JOINTS>;
 
-/// What the turn before told about itself.
+/// Timing of the turn before.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Timing {
     /// It missed its deadline.
@@ -22,7 +22,7 @@ pub struct Timing {
     pub cycles: u32,
 }
 
-/// What the control task does each time that it starts: a turn, and its answers to the queues.
+/// Does one start of the control task: a turn, and its answers to the queues.
 pub fn task<B: Board>(
     control: &mut Control,
     joints: &mut B::Joints,

@@ -1,4 +1,4 @@
-//! What the last panic or hard fault was, kept in RAM over the reset that follows it.
+//! The last panic or hard fault, kept in RAM over the reset that follows it.
 //!
 //! RAM keeps its contents over every reset but a power cycle. The record lies in the section `.uninit`, which start-up
 //! neither clears nor loads, and a checksum tells it from whatever RAM holds after power-on.
@@ -15,7 +15,8 @@ use crc::{CRC_32_ISO_HDLC, Crc, NoTable};
 /// Of file names and of the record: slow and small, for it is used once.
 const CRC: Crc<u32, NoTable> = Crc::<u32, NoTable>::new(&CRC_32_ISO_HDLC);
 
-/// What is kept: kind, program counter, link register, line, hash of the file's name; and a checksum of them.
+/// The words that are kept: kind, program counter, link register, line, hash of the file's name; and a checksum of
+/// them.
 type Words = [u32; 6];
 
 const PANIC: u32 = 1;

@@ -1,7 +1,7 @@
 //! The baud rate generator of an STM32F4's USART (RM0090 30.3.4): a divider of the bus clock, in sixteenths of a bit, or in
 //! eighths where it is too fast for sixteenths.
 
-/// What the generator is set to.
+/// The settings of the generator.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Divider {
     /// The register BRR.
@@ -11,7 +11,7 @@ pub struct Divider {
 }
 
 impl Divider {
-    /// That for a rate, if it can be had to 1 %.
+    /// Returns the settings for a rate, if it can be had to 1 %.
     pub const fn new(bus_hz: u32, baud: u32) -> Option<Self> {
         if baud == 0 {
             return None;

@@ -1,6 +1,6 @@
-//! What runs on the microcontroller around the shared [`Device`](blindgrasp_shared::device::Device): wiring, and drivers.
-//! What the hand does is decided there; here are pins, clocks, queues and interrupts. What is true of one board
-//! alone is in that board's folder ([`boards`]).
+//! The surroundings of the shared [`Device`](blindgrasp_shared::device::Device) on the microcontroller: wiring, and
+//! drivers. What the hand does is decided there; here are pins, clocks, queues and interrupts. What is true of one
+//! board alone is in that board's folder ([`boards`]).
 //!
 //! ```text
 //!  priority 3   USART2 --bytes (DMA1)--+                                   bytes (DMA1) --> USART2

@@ -23,11 +23,11 @@ pub type SentBytes = SendRing<256>;
 pub trait Port {
     /// The next byte, if one came.
     fn receive(&mut self) -> Option<u8>;
-    /// Whether no byte waits.
+    /// Returns `true` if no byte waits.
     fn is_silent(&self) -> bool;
     /// Sends as many of the bytes as the line can take now, from the first on, and returns how many.
     fn send(&mut self, bytes: &[u8]) -> usize;
-    /// Whether the last byte has left, with its stop bit.
+    /// Returns `true` if the last byte has left, with its stop bit.
     fn is_sent(&self) -> bool;
     /// Changes the rate, baud.
     fn set_baud(&mut self, baud: u32);
@@ -36,7 +36,7 @@ pub trait Port {
 /// Refusals that can wait to be sent: more than there are frames in the bytes that can wait to be looked at.
 const REFUSALS: usize = 64;
 
-/// What a frame with a good CRC held.
+/// The content of a frame with a good CRC.
 pub enum Received {
     /// A request.
     Packet(HandPacket),
@@ -165,7 +165,7 @@ impl<'q, P: Port> Link<'q, P> {
         }
     }
 
-    /// Whether there is nothing to do until an interrupt.
+    /// Returns `true` if there is nothing to do until an interrupt.
     pub fn is_idle(&self) -> bool {
         self.sent == self.length
             && self.next_baud.is_none()
@@ -199,7 +199,8 @@ mod tests {
     use std::collections::VecDeque;
     use std::vec::Vec;
 
-    /// What comes, and what was sent; the line takes a byte only at every so many tries, at every other at best.
+    /// A line with the bytes that come and those that were sent; the line takes a byte only at every so many tries, at
+    /// every other at best.
     #[derive(Default)]
     struct Wire {
         incoming: VecDeque<u8>,

@@ -24,7 +24,7 @@ pub type HandReply = Reply<'static, JOINTS>;
 
 /// An answer to a request.
 pub struct Answer {
-    /// What it says.
+    /// Its content.
     pub reply: HandReply,
     /// The rate that the line is to have once it has left, baud.
     pub baud: Option<u32>,
@@ -36,9 +36,9 @@ impl From<HandReply> for Answer {
     }
 }
 
-/// What the hand tells by itself.
+/// A message that the hand sends unasked.
 pub enum Telemetry {
-    /// What a tick did, and how that is told.
+    /// The record of a tick, and its form.
     Record(Record<JOINTS>, Form),
     /// A part of a snapshot.
     Part(Part),
@@ -69,7 +69,7 @@ const STOPS: usize = 2;
 /// The store is told one thing at a time.
 const ORDERS: usize = 2;
 
-/// What became of an order.
+/// The result of an order.
 pub type Stored = Result<(), StoreError>;
 
 /// Memory of all queues.
@@ -144,7 +144,7 @@ impl ControlEnd<'_> {
         stop.or_else(|| may_take(false, room).then(|| dequeue(&mut self.packets)).flatten())
     }
 
-    /// How many answers there is room for.
+    /// Returns the number of answers that there is room for.
     pub fn room(&self) -> usize {
         let capacity = self.answers.capacity();
         if is_nothing(capacity) { 0 } else { capacity.saturating_sub(self.answers.len()) }
@@ -156,7 +156,7 @@ impl ControlEnd<'_> {
         let _ = enqueue(&mut self.orders, order);
     }
 
-    /// What became of it, once it is done.
+    /// Returns the result of the order, once it is done.
     pub fn stored(&mut self) -> Option<Stored> {
         dequeue(&mut self.stored)
     }
@@ -173,12 +173,12 @@ impl ControlEnd<'_> {
         self.dropped = self.dropped.saturating_add(u32::from(lost));
     }
 
-    /// How many records and parts wait for the line.
+    /// Returns the number of records and parts that wait for the line.
     pub fn waiting(&self) -> usize {
         if is_nothing(self.records.capacity()) { 0 } else { self.records.len() }
     }
 
-    /// How many records and parts were dropped so far.
+    /// Returns the number of records and parts that were dropped so far.
     pub fn dropped(&self) -> u32 {
         self.dropped
     }
@@ -231,14 +231,14 @@ impl LinkEnd<'_> {
         dequeue(&mut self.records)
     }
 
-    /// Whether nothing waits to be sent.
+    /// Returns `true` if nothing waits to be sent.
     pub fn is_empty(&self) -> bool {
         self.answers.len() == 0 && self.records.len() == 0
     }
 }
 
-/// Whether a queue has a size of zero, which none has. The library divides by the size; with this asked first, the
-/// compiler sees that the division can't panic.
+/// Returns `true` if a queue has a size of zero, which none has. The library divides by the size; with this asked
+/// first, the compiler sees that the division can't panic.
 const fn is_nothing(capacity: usize) -> bool {
     capacity == usize::MAX
 }

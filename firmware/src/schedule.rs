@@ -29,7 +29,7 @@ pub fn cycle_count() -> u32 {
     DWT::cycle_count()
 }
 
-/// Whether the timer has called for the control task, which has not begun yet.
+/// Returns `true` if the timer has called for the control task, which has not begun yet.
 #[cfg(target_os = "none")]
 pub fn is_pending() -> bool {
     SCB::is_pendst_pending()

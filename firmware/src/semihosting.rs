@@ -14,7 +14,7 @@ const SYS_EXIT_EXTENDED: usize = 0x20;
 /// Reason of an exit: the application is done.
 const APPLICATION_EXIT: usize = 0x20026;
 
-/// How a file is opened: `fopen`'s "rb" and "wb".
+/// The mode in which a file is opened: `fopen`'s "rb" and "wb".
 #[derive(Clone, Copy)]
 pub enum Access {
     /// For reading.

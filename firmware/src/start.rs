@@ -14,7 +14,7 @@ use blindgrasp_shared::link::rate::{FASTER_BAUDS, FIRST_BAUD};
 use blindgrasp_shared::tick::Params;
 use core::mem::MaybeUninit;
 
-/// Where the hand is for as long as the program runs.
+/// The memory in which the hand is for as long as the program runs.
 pub struct Memory {
     control: MaybeUninit<Control>,
     burst: HandBurst,

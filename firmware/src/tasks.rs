@@ -1,5 +1,5 @@
-//! What the tasks of the image `hand` do, on any board. The image itself binds them to interrupts, by the names that those have on
-//! its board.
+//! The tasks of the image `hand`, on any board. The image itself binds them to interrupts, by the names that those have
+//! on its board.
 
 use crate::boards::Board;
 use crate::control::{Control, Timing, task};
@@ -17,7 +17,7 @@ pub struct ControlTask<B: Board> {
     pub joints: B::Joints,
     /// Its end of the queues.
     pub queues: ControlEnd<'static>,
-    /// What the turn before told.
+    /// The timing of the turn before.
     pub last: Timing,
     /// Not in the emulator.
     pub watchdog: Option<B::Watchdog>,
@@ -43,7 +43,7 @@ pub struct IdleTask<B: Board> {
     pub link: Link<'static, B::Line>,
     /// Errors of the line that were not told yet.
     pub errors: LineErrors,
-    /// Where parameters are saved, if there is anything, with the hash of the hand.
+    /// The store of saved parameters, if there is one, with the hash of the hand.
     pub store: Option<(Store<B::Flash>, u32)>,
     /// Its end of the queues.
     pub store_end: StoreEnd<'static>,
@@ -58,7 +58,7 @@ impl<B: Board> IdleTask<B> {
         self.errors.poll(now, B::line_errors(), self.link.counters())
     }
 
-    /// Whether there is nothing to do until an interrupt.
+    /// Returns `true` if there is nothing to do until an interrupt.
     pub fn is_idle(&self) -> bool {
         self.link.is_idle()
     }
@@ -67,7 +67,7 @@ impl<B: Board> IdleTask<B> {
 /// Ticks between two looks at the line's errors.
 const PERIOD_TICKS: u32 = 1000;
 
-/// What is wrong with the line, since the start.
+/// Errors of the line since the start.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct LineErrors {
     looked_at: u32,

@@ -23,7 +23,7 @@ use std::cell::RefCell;
 use std::collections::VecDeque;
 use std::rc::Rc;
 
-/// What would be wires and registers: of this test's thread alone, as the trait's functions have no board.
+/// The wires and registers of this test's board: of this test's thread alone, as the trait's functions have no board.
 #[derive(Default)]
 struct World {
     incoming: VecDeque<u8>,

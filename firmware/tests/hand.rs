@@ -1,4 +1,4 @@
-//! What this firmware was built with, against the hand's file (`HAND`, as for the build).
+//! The hand that this firmware was built with, against its file (`HAND`, as for the build).
 
 use blindgrasp_firmware::model::{
     FINGERS, IMAGE_HAND, IMAGE_PIL, JOINTS, MODEL, params, torques_per_volt_nm_v,
@@ -17,7 +17,8 @@ fn hand_model() -> HandModel {
     HandModel::load(name).expect("the build has read it")
 }
 
-/// What the firmware decodes is what the simulation computes with, in whatever capacity. The bytes tell minus zero from zero.
+/// The firmware decodes the hand that the simulation computes with, in whatever capacity. The bytes tell minus zero
+/// from zero.
 #[test]
 fn the_model_is_the_hand_to_the_bit() {
     let model = hand_model();

@@ -503,7 +503,7 @@ fn every_failure_can_be_recovered_from() {
     }
 }
 
-/// What a tick costs on the buses, at 2.625 MHz for the counters and 5.25 MHz for the DACs, of 1000 us.
+/// The time that a tick takes on the buses, at 2.625 MHz for the counters and 5.25 MHz for the DACs, of 1000 us.
 #[test]
 fn the_buses_are_busy_for_a_stated_time() {
     let board = Board::<12, 3>::powered_up();

@@ -1,5 +1,5 @@
-//! What gets out of the line when the processor is charged for all that it does: the link's own code, under a clock that
-//! leaves it only the time that the control task does not take.
+//! The bytes that leave the line when the processor is charged for all that it does: the link's own code, under a clock
+//! that leaves it only the time that the control task does not take.
 //!
 //! The emulator has no time on its SPI buses, no DMA and no baud rate; here all three are, as arithmetic:
 //!
@@ -60,7 +60,7 @@ fn counted(name: &str) -> u64 {
     line.and_then(|number| number.parse().ok()).unwrap_or_else(|| panic!("{name} is not written down"))
 }
 
-/// How bytes leave.
+/// The way in which bytes leave.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Way {
     Polling,
@@ -74,7 +74,7 @@ struct Wire {
     encoding_per_byte: u64,
     encoding_of_input: u64,
     now: u64,
-    /// When the byte in work is sent, and the bytes behind it that need no processor.
+    /// The time at which the byte in work is sent, and the bytes behind it that need no processor.
     done_at: Option<u64>,
     behind: VecDeque<u8>,
     transfers: Transfers,
@@ -208,7 +208,7 @@ impl Joints<JOINTS> for Swinging {
     }
 }
 
-/// What came out of the line.
+/// The bytes that came out of the line.
 #[derive(Debug, Default)]
 struct Outcome {
     bytes_per_ms: f64,
@@ -223,12 +223,12 @@ struct Outcome {
     idle_share: f64,
 }
 
-/// What is to be sent.
+/// The records that are to be sent.
 #[derive(Clone, Copy, PartialEq)]
 enum Load {
     /// A full record a tick, whether or not the line takes it.
     Everything,
-    /// What the hand decides to send to one who asked for every record, and for its state.
+    /// Those that the hand decides to send to one who asked for every record, and for its state.
     Asked,
 }
 
@@ -323,7 +323,7 @@ fn run(way: Way, baud: f64, ticks: u32, load: Load) -> Outcome {
     outcome
 }
 
-/// What can get out at the most, at every rate, by polling and by DMA.
+/// The most bytes that can leave, at every rate, by polling and by DMA.
 #[test]
 fn bytes_a_millisecond() {
     let busy_us = (spi_cycles() as f64 + (counted("tick") * 2 * JOINTS as u64 / 12) as f64) / 168.0;

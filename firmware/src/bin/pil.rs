@@ -111,7 +111,7 @@ mod app {
     struct Pipes {
         from: File,
         to: File,
-        /// What was read, and what of it was taken.
+        /// The bytes that were read, of which some were taken.
         buffer: [u8; 512],
         taken: usize,
         length: usize,

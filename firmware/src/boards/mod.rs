@@ -28,7 +28,7 @@ pub trait Board: Sized {
 
     /// Frequency of the processor and its timer, Hz.
     const CLOCK_HZ: u32;
-    /// That of the timer in the emulator, Hz.
+    /// Frequency of the timer in the emulator, Hz.
     const EMULATED_HZ: u32;
 
     /// Returns the findings of the start.
@@ -73,7 +73,7 @@ pub struct Parts<B: Board> {
 pub struct Found {
     /// Source of the clock.
     pub clock: Clock,
-    /// Why there was a reset.
+    /// The cause of the reset.
     pub reset: ResetCause,
     /// Crash that ended the run before it.
     pub crash: Option<Crash>,

@@ -79,7 +79,7 @@ const PATTERNS: [[i16; CHANNELS]; 2] =
 /// Codes a volt: 32768 for 10 V.
 pub const CODES_PER_VOLT: f32 = 3276.8;
 
-/// What is wrong with a DAC.
+/// A fault of a DAC.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum DacError {
     /// The microcontroller's SPI failed.
@@ -90,9 +90,9 @@ pub enum DacError {
         register: &'static str,
         /// The output, 0 to 3; 0 for a register of the whole chip.
         channel: u8,
-        /// What was written.
+        /// The word that was written.
         written: u16,
-        /// What was read.
+        /// The word that was read.
         read: u16,
     },
     /// An output carries more than about 20 mA.

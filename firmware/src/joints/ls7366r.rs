@@ -73,8 +73,8 @@ const STR_CEN: u8 = 1 << 3;
 /// STR bit 2: power was lost; set at power-up, cleared by `CLR STR`.
 const STR_PLS: u8 = 1 << 2;
 
-/// What is written to the counter and read back: a one, then a zero, that walks through every bit, with no two bytes
-/// alike, so that a bit that sticks, a byte that is lost and a shift by one clock are all seen.
+/// The words that are written to the counter and read back: a one, then a zero, that walks through every bit, with no
+/// two bytes alike, so that a bit that sticks, a byte that is lost and a shift by one clock are all seen.
 const PATTERNS: [u32; 4] = [0x0102_0408, 0x1020_4080, 0xFEFD_FBF7, 0xEFDF_BF7F];
 
 /// Clock of the quadrature filter, from the oscillator at fCKi. It has to be at least four times the frequency of
@@ -96,7 +96,7 @@ impl FilterClock {
     }
 }
 
-/// Whether a counter still knows where the joint is.
+/// A counter's knowledge of where the joint is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Zero {
     /// It counted on since it was started: its zero is what it was.
@@ -105,7 +105,7 @@ pub enum Zero {
     Lost,
 }
 
-/// What is wrong with a counter.
+/// A fault of a counter.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum CounterError {
     /// The microcontroller's SPI failed.
@@ -119,9 +119,9 @@ pub enum CounterError {
     NotStored {
         /// The register.
         register: &'static str,
-        /// What was written.
+        /// The count that was written.
         written: u32,
-        /// What was read.
+        /// The count that was read.
         read: u32,
     },
     /// It answers, but has lost its power since it was started, and the joint's zero with it; or it does not count.
@@ -133,9 +133,9 @@ pub enum CounterError {
     Changed {
         /// The register.
         register: &'static str,
-        /// What was written.
+        /// The byte that was written.
         written: u8,
-        /// What was read.
+        /// The byte that was read.
         read: u8,
     },
 }
@@ -218,7 +218,7 @@ impl<SPI: SpiDevice> Counter<SPI> {
         Ok(Zero::Lost)
     }
 
-    /// Whether this is the chip to which [`prepare`](Self::prepare) gave `tag`, and not another that answers to the
+    /// Checks that this is the chip to which [`prepare`](Self::prepare) gave `tag`, and not another that answers to the
     /// same select: to be asked when every counter has got its own.
     ///
     /// # Errors
@@ -307,7 +307,7 @@ fn stored(register: &'static str, written: u32, read: u32) -> Result<(), Counter
     if written == read { Ok(()) } else { Err(CounterError::NotStored { register, written, read }) }
 }
 
-/// What a counter's STR says of it.
+/// Returns the fault that a counter's STR tells, if any.
 const fn healthy(status: u8) -> Result<(), CounterError> {
     match status {
         level @ (0x00 | 0xFF) => Err(CounterError::Silent { level }),

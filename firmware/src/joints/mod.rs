@@ -39,7 +39,7 @@ use embedded_hal::digital::OutputPin;
 use embedded_hal::spi::SpiDevice;
 use ls7366r::{Counter, CounterError, FilterClock, Zero};
 
-/// How a torque becomes a voltage.
+/// The way from a torque to a voltage.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct OutputConfig {
     /// Torque at the joint for each volt at the amplifier's input, N m/V.
@@ -55,7 +55,7 @@ pub struct JointsConfig<const J: usize> {
     pub outputs: [OutputConfig; J],
 }
 
-/// Why there can be no joints of these numbers.
+/// An error in the numbers of the joints.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ConfigError {
     /// The DACs do not have an output for every joint, or one of them has none to drive.
@@ -86,16 +86,16 @@ impl fmt::Display for ConfigError {
 
 impl core::error::Error for ConfigError {}
 
-/// What is wrong, and with which joint.
+/// A fault of a joint.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Failure {
     /// The joint; for a DAC as a whole, the joint of its first output.
     pub joint: usize,
-    /// What is wrong.
+    /// The fault.
     pub cause: Cause,
 }
 
-/// Which of a joint's two chips it is, and what is wrong with it.
+/// The fault of one of a joint's two chips.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Cause {
     /// The counter.
@@ -155,7 +155,7 @@ pub struct BoardJoints<C, O, E, const J: usize, const D: usize> {
     codes_per_nm: [f32; J],
     /// The codes that were loaded last.
     codes: [i16; J],
-    /// What the self-test found: which counters begin at 0.
+    /// The result of the self-test: which counters begin at 0.
     zeros: [Zero; J],
     state: State,
     /// The joint whose counter's settings are read back next.
@@ -215,7 +215,7 @@ impl<C: SpiDevice, O: SpiDevice, E: OutputPin, const J: usize, const D: usize> B
         Ok(joints)
     }
 
-    /// What is wrong, in words; `None` while the joints work.
+    /// Returns the fault, in words; `None` while the joints work.
     pub const fn failure(&self) -> Option<Failure> {
         match self.state {
             State::Running => None,
@@ -223,7 +223,7 @@ impl<C: SpiDevice, O: SpiDevice, E: OutputPin, const J: usize, const D: usize> B
         }
     }
 
-    /// Whether each counter kept its count when it was last tested, or began at 0 when it was started.
+    /// Returns of each counter that it kept its count when it was last tested, or began at 0 when it was started.
     pub const fn zeros(&self) -> &[Zero; J] {
         &self.zeros
     }

@@ -6,7 +6,7 @@ use embedded_hal::spi::{ErrorKind, ErrorType, Operation, SpiDevice};
 use std::cell::{Cell, RefCell};
 use std::rc::Rc;
 
-/// What becomes of the lines between the microcontroller and a chip.
+/// Damage to the lines between the microcontroller and a chip.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum Line {
     #[default]
@@ -173,7 +173,7 @@ pub struct DacChip {
     pub alerts: u16,
     /// The highest voltage that an output ever had.
     pub most_v: f32,
-    /// What the next frame brings.
+    /// The word that the next frame brings.
     pub asked: u16,
 }
 

@@ -29,7 +29,7 @@ pub struct Stm32f405 {
     watchdog: IWDG,
 }
 
-/// What serves the interrupts of the line.
+/// The parts that serve the interrupts of the line.
 pub struct Interrupts {
     /// `USART2`.
     pub line: Interrupt,

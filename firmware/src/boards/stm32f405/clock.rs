@@ -14,11 +14,11 @@ use stm32f4xx_hal::pac::{DBGMCU, RCC};
 use stm32f4xx_hal::prelude::*;
 use stm32f4xx_hal::rcc::{Config, Rcc};
 
-/// How often the crystal is looked at. It starts within 2 ms (DS8626, HSE oscillator characteristics); a look takes
-/// at least 6 cycles of the 16 MHz that the processor starts with, so this is 18 ms or more.
+/// The most looks at the crystal until it is given up. It starts within 2 ms (DS8626, HSE oscillator characteristics);
+/// a look takes at least 6 cycles of the 16 MHz that the processor starts with, so this is 18 ms or more.
 const MOST_LOOKS: u32 = 50_000;
 
-/// Whether this is QEMU: there the device's identity code, 0x413 on hardware, is not modelled.
+/// Returns `true` if this is QEMU: there the device's identity code, 0x413 on hardware, is not modelled.
 pub fn is_emulated(debug: &DBGMCU) -> bool {
     debug.idcode().read().bits() == 0
 }

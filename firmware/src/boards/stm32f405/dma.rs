@@ -75,7 +75,7 @@ impl Receiving {
     }
 }
 
-/// Where the circular transfer is.
+/// Returns the position of the circular transfer.
 pub fn position() -> Position {
     // SAFETY: reading these registers changes nothing.
     let dma = unsafe { &*DMA1::ptr() };

@@ -17,7 +17,7 @@ use embedded_storage::nor_flash::{
     ErrorType, NorFlash, NorFlashError, NorFlashErrorKind, ReadNorFlash, check_erase, check_read, check_write,
 };
 
-/// Where the sectors begin. `memory.x` ends the image here.
+/// Address of the first of the sectors. `memory.x` ends the image here.
 pub const BEGIN: u32 = 0x080C_0000;
 /// Bytes of both.
 pub const BYTES: u32 = 2 * SECTOR_BYTES;
@@ -51,8 +51,8 @@ const BY_WORDS: u32 = 0b10 << 8;
 const START: u32 = 1 << 16;
 const LOCK: u32 = 1 << 31;
 
-/// How often the flash is looked at until it has to be ready. A look takes at least 4 cycles, 24 ns: these are 0.4 ms for
-/// a word and 3.5 s for a sector or more, and rather three times that.
+/// The most looks at the flash until it has to be ready. A look takes at least 4 cycles, 24 ns: these are 0.4 ms for a
+/// word and 3.5 s for a sector or more, and rather three times that.
 const LOOKS_PER_WORD: u32 = 16_000;
 const LOOKS_PER_SECTOR: u32 = 150_000_000;
 
@@ -64,7 +64,7 @@ pub trait Bus {
     fn write(&mut self, address: u32, word: u32);
 }
 
-/// Why the flash did not do as it was told.
+/// A failure of the flash to do as it was told.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum FlashError {
     /// It can't: nothing was begun.
@@ -220,7 +220,7 @@ mod tests {
     /// The controller and its sectors, as RM0090 describes them; what it forbids ends the test.
     struct Model {
         words: Vec<u32>,
-        /// What the data cache holds: it follows what is programmed, but not what is erased.
+        /// The contents of the data cache: it follows what is programmed, but not what is erased.
         cache: RefCell<BTreeMap<u32, u32>>,
         access: u32,
         status: u32,

@@ -1,4 +1,4 @@
-//! Why the microcontroller was reset, and when its supply resets it.
+//! Causes of a reset of the microcontroller, and the supply voltage that causes one.
 
 use blindgrasp_shared::identity::{BrownOut, ResetCause};
 

@@ -19,7 +19,7 @@ const THRESHOLD: u8 = 6;
 /// The detector's line of EXTI (RM0090 5.2.3).
 const LINE: u32 = 1 << 16;
 
-/// Whether the interrupt came since [`take`].
+/// `true` if the interrupt came since [`take`].
 static SAGGED: AtomicBool = AtomicBool::new(false);
 
 /// Starts the detector and lets it interrupt when the supply falls below the threshold.
@@ -34,14 +34,14 @@ pub fn start(power: &PWR, lines: &EXTI, clocks: &RCC) {
     lines.imr().modify(|r, w| unsafe { w.bits(r.bits() | LINE) });
 }
 
-/// What the detector's interrupt does besides taking the amplifiers' power.
+/// Notes that the detector's interrupt came, which takes the amplifiers' power.
 pub fn sagged() {
     SAGGED.store(true, Ordering::Relaxed);
     // SAFETY: the register is always there, and a one clears the bit of this line alone.
     unsafe { (*EXTI::ptr()).pr().write(|w| w.bits(LINE)) };
 }
 
-/// Whether the supply is too low, or was since [`take`].
+/// Returns `true` if the supply is too low, or was since [`take`].
 pub fn is_low() -> bool {
     // SAFETY: the register is always there; reading it changes nothing. It reads zero where there is no detector.
     SAGGED.load(Ordering::Relaxed) || unsafe { (*PWR::ptr()).csr().read().pvdo().bit_is_set() }
