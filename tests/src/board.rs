@@ -16,9 +16,9 @@ use std::thread;
 use std::time::{Duration, Instant};
 use tempfile::TempDir;
 
-/// How long QEMU may take to start.
+/// Longest time that QEMU may take to start.
 const START: Duration = Duration::from_secs(20);
-/// How long its monitor may take to answer.
+/// Longest time that its monitor may take to answer.
 const MONITOR: Duration = Duration::from_secs(20);
 /// Counter of TIM2. QEMU's model counts nanoseconds of the firmware's time from the start, enabled or not, modulo 2^32.
 const NANOSECONDS: u32 = 0x4000_0024;
@@ -31,17 +31,17 @@ pub struct Board {
     /// Ends QEMU when the end of its input says that this process is gone.
     guard: Child,
     line: UnixStream,
-    /// What the line has brought: it is always read at once, because QEMU stands still, monitor and all, when a byte that
-    /// its board sends finds no room.
+    /// The bytes that the line has brought: it is always read at once, because QEMU stands still, monitor and all, when
+    /// a byte that its board sends finds no room.
     received: Receiver<Vec<u8>>,
-    /// What of it was not yet asked for.
+    /// The bytes of it that were not yet asked for.
     rest: VecDeque<u8>,
     monitor: BufReader<UnixStream>,
     ticks_at: u32,
     _folder: TempDir,
 }
 
-/// What a board's time follows.
+/// The clock that a board's time follows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Pace {
     /// The time here.
@@ -53,7 +53,7 @@ pub enum Pace {
     },
 }
 
-/// What was seen of the board's time at one instant.
+/// The board's time, as seen at one instant.
 #[derive(Clone, Copy, Debug)]
 pub struct Instants {
     /// Its clock, ns, modulo 2^32.

@@ -1,5 +1,5 @@
-//! Where the energy of a simulated hand goes, sub-step by sub-step: what the motors do, what hand and object store, and
-//! what is taken by contacts and joints.
+//! The energy of a simulated hand, sub-step by sub-step: what the motors do, what hand and object store, and what is
+//! taken by contacts and joints.
 
 use crate::supervised::{Outcome, Turned};
 use blindgrasp::body::dynamics::JointVector;
@@ -50,13 +50,13 @@ pub fn stored_j(plant: &Plant) -> f64 {
 /// Sums since the beginning of a grasp, J.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Books {
-    /// What the motors did, with the turns that the joints really made.
+    /// Work of the motors, with the turns that the joints really made.
     pub work_j: f64,
     /// By how much what hand and object store has grown.
     pub stored_j: f64,
-    /// What the contacts took.
+    /// Energy that the contacts took.
     pub contacts_j: f64,
-    /// What the friction of the joints took; it can give back the little that its springs store.
+    /// Energy that the friction of the joints took; it can give back the little that its springs store.
     pub friction_j: f64,
 }
 
@@ -141,7 +141,7 @@ pub fn keep(scene: &Scene) -> Vec<Page> {
     pages
 }
 
-/// What the ledger's excess would be with perfect sensors, at each sample, J: from the torques that acted, the turns that the
+/// Returns the ledger's excess with perfect sensors, at each sample, J: from the torques that acted, the turns that the
 /// joints really made, and the law's potentials where they really were.
 ///
 /// # Panics

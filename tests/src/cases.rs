@@ -73,24 +73,24 @@ impl Case {
         }
     }
 
-    /// Where everything is for some angles, rad.
+    /// Returns the posture for some angles, rad.
     pub fn posture(&self, angles: &Torques) -> Posture<f64, JOINTS, FINGERS> {
         let mut posture = Posture::at_base();
         self.hand.forward_kinematics(angles, &mut posture);
         posture
     }
 
-    /// How the hand stood when the grasp began.
+    /// Returns the laws' memory of the beginning of the grasp.
     pub fn latch(&self) -> Latch<f64, JOINTS, FINGERS> {
         Latch::of(&self.posture(&self.latched), &self.latched)
     }
 
-    /// What the law does at some speeds, rad/s, with some gains.
+    /// Returns the result of the law at some speeds, rad/s, with some gains.
     pub fn with_gains(&self, speeds: &Torques, gains: PerGain<f64>) -> (Torques, Account<f64>) {
         self.with_grip(&self.angles, speeds, Some(&Grip { latch: &self.latch(), gains }))
     }
 
-    /// What the law does at some angles, rad, and speeds, rad/s, in some grip.
+    /// Returns the result of the law at some angles, rad, and speeds, rad/s, in some grip.
     pub fn with_grip(
         &self,
         angles: &Torques,
@@ -115,7 +115,7 @@ impl Case {
         self.law.grasp.attitude_wrenches(&self.hand, posture, &latch.grasp, K_ST_NM)
     }
 
-    /// What the law knows of itself.
+    /// Returns the law's own account.
     pub fn monitor(&self) -> Account<f64> {
         self.with_gains(&self.speeds, self.law.gains()).1
     }

@@ -14,11 +14,11 @@ use std::time::{Duration, Instant};
 /// A reply of a hand of any size.
 pub type Reply<'a> = message::Reply<'a, MAX_JOINTS>;
 
-/// How long the firmware may take to start.
+/// Longest time that the firmware may take to start.
 const START: Duration = Duration::from_secs(20);
-/// How long an answer may take. No answer takes a hundredth of this; but this machine may be busy.
+/// Longest time that an answer may take. No answer takes a hundredth of this; but this machine may be busy.
 const ANSWER: Duration = Duration::from_secs(20);
-/// How long one hello waits while the firmware may still be starting.
+/// Time for which one hello waits while the firmware may still be starting.
 const HELLO: Duration = Duration::from_millis(300);
 
 /// The frame of a message.
@@ -35,7 +35,7 @@ pub fn frame(message: &impl Serialize) -> Vec<u8> {
 pub struct Heard(Vec<u8>);
 
 impl Heard {
-    /// What it says.
+    /// Returns the reply.
     ///
     /// # Panics
     /// If it is no reply.
@@ -54,7 +54,7 @@ impl Heard {
         }
     }
 
-    /// Why the request was refused, if it was; `None`: done.
+    /// Returns the reason for which the request was refused, if it was; `None`: done.
     ///
     /// # Panics
     /// If it is no answer of this kind.

@@ -16,7 +16,7 @@ pub struct Description {
     pub fingertips: Vec<Fingertip<f64>>,
 }
 
-/// Where everything is in the base frame; one entry a joint, or a fingertip.
+/// Poses in the base frame; one entry a joint, or a fingertip.
 #[derive(Clone, Debug)]
 pub struct Placed {
     /// Origins of the joints and of their link frames, m.
@@ -65,7 +65,7 @@ impl Description {
         self.chain(self.fingertips[fingertip].link).count()
     }
 
-    /// How far a fingertip's centre can get from the base's origin at most, m.
+    /// Returns the largest distance of a fingertip's centre from the base's origin, m.
     pub fn reach_m(&self, fingertip: usize) -> f64 {
         let tip = &self.fingertips[fingertip];
         tip.offset_m.norm() + self.chain(tip.link).map(|k| self.joints[k].offset_m.norm()).sum::<f64>()

@@ -88,11 +88,11 @@ pub struct Grasp {
     pub description: Description,
     /// The plant's model; change it before [`Self::plant`].
     pub model: PlantModel,
-    /// Where a run starts; the latch is taken there.
+    /// The start of a run; the latch is taken there.
     pub start: Motion,
     /// The laws.
     pub laws: Laws<f64, MAX_JOINTS>,
-    /// How the hand stands at the start.
+    /// The laws' memory of the hand at the start.
     pub latch: Latch<f64, MAX_JOINTS, MAX_FINGERS>,
 }
 

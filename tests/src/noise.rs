@@ -7,7 +7,7 @@ use std::collections::BTreeMap;
 
 /// Each face in triangles, cut in four so many times.
 const CUTS: usize = 2;
-/// How far a vertex of a mesh is from where it should be, in units of the body's extent: about what a 3-D print has.
+/// Distance of a vertex of a mesh from its true place, in units of the body's extent: about what a 3-D print has.
 const NOISE: f64 = 2e-4;
 
 /// The same body as a mesh with noise, as the text of an ASCII STL in millimetres: faces cut into small triangles, whose

@@ -33,7 +33,7 @@ pub struct State {
     pub torques_nm: JointVector,
 }
 
-/// What the plant makes of a state, each kind of number for itself.
+/// The plant's response to a state, each kind of number for itself.
 #[derive(Clone, Debug)]
 pub struct Response {
     /// `(dq, dx, w)` that obey the constraints: those of the state, projected.
@@ -46,7 +46,7 @@ pub struct Response {
     pub normal_n: Vec<f64>,
     /// Torsional torque of every contact, N m.
     pub torsion_nm: Vec<f64>,
-    /// What the derivatives are off by, at most, relative to the largest number of their kind.
+    /// Largest error of the derivatives, relative to the largest number of their kind.
     pub uncertainty: f64,
 }
 
@@ -126,8 +126,8 @@ impl State {
         numbers
     }
 
-    /// What the plant makes of the state. The steps are those whose derivatives are the least uncertain: the smaller they are,
-    /// the less is left of the fastest motion and the more is rounded.
+    /// Returns the plant's response to the state. The steps are those whose derivatives are the least uncertain: the
+    /// smaller they are, the less is left of the fastest motion and the more is rounded.
     pub fn response(&self) -> Response {
         let joints = self.model.hand.joint_count();
         let speeds = joints + 6;

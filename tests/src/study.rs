@@ -19,24 +19,24 @@ const DURATION: &str = "duration_s=5.0";
 pub struct Specimen {
     /// The object.
     pub object: ObjectFile,
-    /// How many faces it has.
+    /// Number of its faces.
     pub faces: usize,
     /// Largest distance between two corners, m.
     pub extent_m: f64,
 }
 
-/// What became of it.
+/// The outcome of an object.
 #[derive(Clone, Debug)]
 pub struct Outcome {
     /// The placement, or why there is none.
     pub placed: Result<Box<Placement>, String>,
-    /// How long the search took, s.
+    /// Time that the search took, s.
     pub search_s: f64,
-    /// What the grasp came to.
+    /// The runs of its grasp.
     pub runs: Option<Runs>,
 }
 
-/// What a grasp came to.
+/// The runs of a grasp.
 #[derive(Clone, Debug)]
 pub struct Runs {
     /// In the paper's model.

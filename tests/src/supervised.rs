@@ -22,12 +22,12 @@ use std::ops::Range;
 /// Ticks from one heartbeat of the host to the next: a fifth of what is allowed.
 pub const HEARTBEAT_TICKS: u64 = 50;
 
-/// What happens in a run.
+/// The course of a run.
 #[derive(Clone, Debug, Default)]
 pub struct Course {
-    /// What goes wrong, and when.
+    /// The faults that are injected, with their times.
     pub injections: Vec<Injection>,
-    /// What the user asks for, and in which tick; the grasp of tick 0 needs no entry.
+    /// The commands of the user, with their ticks; the grasp of tick 0 needs no entry.
     pub commands: Vec<(u64, Command)>,
     /// Somebody leans on the fingers: torques on the joints besides those of the motors, N m, and during which ticks.
     pub pushes: Vec<(Range<u64>, [f32; MAX_JOINTS])>,
@@ -49,7 +49,7 @@ pub struct Turned {
     pub torques_nm: [f32; MAX_JOINTS],
     /// Joint speeds as it saw them, rad/s.
     pub speeds_rad_s: [f32; MAX_JOINTS],
-    /// What limited each joint.
+    /// The limit that acted on each joint.
     pub limiting: [Limiting; MAX_JOINTS],
     /// The gains that act.
     pub gains: PerGain<f32>,
@@ -57,7 +57,7 @@ pub struct Turned {
     pub potentials_j: PerGain<f32>,
     /// Work of the motors since the grasp began, J.
     pub work_j: f32,
-    /// What the law's damping took of it, J.
+    /// The part of it that the law's damping took, J.
     pub damped_j: f32,
     /// Work of the last second beyond the drop of the potentials, J.
     pub excess: f32,
@@ -133,12 +133,12 @@ impl Controller for Supervised {
     }
 }
 
-/// What came of a course.
+/// The outcome of a course.
 #[derive(Clone, Debug)]
 pub struct Outcome {
     /// The run, as the plant had it.
     pub run: Run,
-    /// What the controller did, a tick each.
+    /// The controller's ticks.
     pub turned: Vec<Turned>,
 }
 

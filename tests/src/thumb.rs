@@ -1,4 +1,4 @@
-//! What the functions of an image for the microcontroller call, and how much stack they take: read from its ELF.
+//! The calls and the stack of each function of an image for the microcontroller: read from its ELF.
 //!
 //! Only what that takes is decoded of the Thumb-2 instructions (ARM DDI 0403E, chapter A5): where an instruction ends,
 //! calls and jumps to other functions, and what lowers the stack pointer. The linker's mapping symbols tell code from
@@ -18,7 +18,7 @@ pub struct Function {
     pub indirect_calls: usize,
     /// Most bytes of stack that it takes itself: everything that its instructions push, as if it were never popped.
     pub stack: u32,
-    /// Whether it sets a stack pointer that can't be read off, or has an instruction that stops at a debugger.
+    /// Its instructions that set a stack pointer that can't be read off, or that stop at a debugger.
     pub odd: Vec<String>,
 }
 

@@ -50,7 +50,7 @@ pub struct RawRobot {
     pub joints: Vec<RawJoint>,
 }
 
-/// Where the links of a robot are.
+/// The poses of a robot's links.
 #[derive(Clone, Debug)]
 pub struct RawPoses {
     /// Origins, m.
@@ -177,7 +177,8 @@ impl RawRobot {
         poses
     }
 
-    /// How a point of a link moves with each of some joints: linear and angular Jacobian, in the axes of the base.
+    /// Returns the motion of a point of a link with each of some joints: linear and angular Jacobian, in the axes of
+    /// the base.
     pub fn jacobians(
         &self,
         base: usize,

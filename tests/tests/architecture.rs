@@ -1,4 +1,4 @@
-//! What the documents say of the structure is so: arrows between the modules of `shared/` go down only, and what the tables of
+//! The structure is as the documents say: arrows between the modules of `shared/` go down only, and what the tables of
 //! signals and parameters list is listed nowhere else.
 
 use blindgrasp_shared::parameters::Parameter;

@@ -189,7 +189,7 @@ impl Equations {
         DMatrix::from_diagonal(&DVector::from_iterator(self.contacts.len(), self.contacts.iter().map(value)))
     }
 
-    /// What is missing in Eqs. 19-21 at given accelerations, contact forces and torques.
+    /// Returns the remainders of Eqs. 19-21 at given accelerations, contact forces and torques.
     fn residual(
         &self,
         acceleration: &DVector<f64>,
@@ -341,8 +341,8 @@ fn multipliers_satisfy_the_equations_of_motion() {
     }
 }
 
-/// How far anything moved between two motions, m: the object's mass centre, its farthest corner by its turn, and the
-/// fingertips' centres.
+/// Returns the largest distance by which anything moved between two motions, m: the object's mass centre, its farthest
+/// corner by its turn, and the fingertips' centres.
 fn drift_m(grasp: &Grasp, before: &Motion, after: &Motion) -> f64 {
     let n = grasp.description.joints.len();
     let centres = |motion: &Motion| grasp.description.placed(&motion.angles_rad[..n]).centres_m;

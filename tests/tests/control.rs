@@ -153,7 +153,7 @@ fn the_weight_that_is_held_is_that_of_the_links() {
     assert!(errors.largest() < 1e-14);
 }
 
-/// What each term puts on the fingertips sums to no force and no moment, about any point; so joints that carry all
+/// The forces and moments of each term on the fingertips sum to zero, about any point; so joints that carry all
 /// fingertips feel only their damping and the weight of the links.
 ///
 /// Tolerance: 1e-14 of the sum of the magnitudes, for sums of up to five terms; the trunk's torques, through chains

@@ -15,7 +15,7 @@ fn integral() -> PerGain<f64> {
     PerGain { integral: [K_I_NM_RAD], ..PerGain::all(0.0) }
 }
 
-/// What `u_I` adds to the torques.
+/// Returns the torques that `u_I` adds.
 fn pull_back(case: &Case) -> Torques {
     let (with, without) =
         (case.with_gains(&STILL, integral()).0, case.with_gains(&STILL, PerGain::all(0.0)).0);
@@ -92,7 +92,7 @@ fn it_equals_the_integral_of_the_speeds() {
     assert!(farthest_rad > 0.01, "or nothing was shown");
 }
 
-/// Whether a joint carries all fingertips.
+/// Returns `true` if a joint carries all fingertips.
 fn is_of_the_trunk(case: &Case, joint: usize) -> bool {
     (0..case.hand.fingertip_count()).all(|i| case.hand.moves(joint, i))
 }

@@ -12,7 +12,7 @@ fn run(scene: &str, settings: &[&str]) -> Run {
     Simulation::new(&scene).expect("the scene can be simulated").run(|_| {})
 }
 
-/// What is missing at a sample, J.
+/// Returns the energy that is missing at a sample, J.
 fn missing_j(first: &EnergySample, now: &EnergySample) -> f64 {
     now.stored_j() - first.stored_j() + now.dissipated_j() - now.motors_j
 }

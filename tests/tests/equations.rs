@@ -7,9 +7,9 @@ use std::path::{Path, PathBuf};
 
 /// The numbered equations of the paper.
 const LAST: u32 = 59;
-/// Where code may be that is named without these folders: as the page says.
+/// Folders of code that is named without them: as the page says.
 const CODE: [&str; 3] = ["", "shared/src", "tests/src"];
-/// Where tests may be.
+/// Folders of tests.
 const TESTS: [&str; 3] = ["", "tests/tests", "host/tests"];
 
 fn root() -> PathBuf {
@@ -49,7 +49,7 @@ fn numbers(cell: &str) -> Result<Vec<u32>, String> {
     Ok(numbers)
 }
 
-/// What stands between backticks.
+/// Returns the words between backticks.
 fn quoted(cell: &str) -> impl Iterator<Item = &str> {
     cell.split('`').skip(1).step_by(2)
 }
@@ -78,7 +78,7 @@ fn open(name: &str, folders: &[&str]) -> Option<String> {
     paths.into_iter().find_map(|path| found(&path))
 }
 
-/// Whether a text defines a function, type or constant of this very name.
+/// Returns `true` if a text defines a function, type or constant of this very name.
 fn defines(text: &str, name: &str) -> bool {
     let name = name.rsplit("::").next().unwrap_or(name);
     ["fn", "struct", "const", "enum", "trait"].iter().any(|kind| {
@@ -91,8 +91,8 @@ fn defines(text: &str, name: &str) -> bool {
     })
 }
 
-/// Whether a text has a test of this name that is run: `#[test]` among the attributes before the function, and no `#[ignore]`
-/// except for those of which `tests/run` sees to what they need.
+/// Returns `true` if a text has a test of this name that is run: `#[test]` among the attributes before the function,
+/// and no `#[ignore]` except for those of which `tests/run` sees to what they need.
 fn tests(text: &str, name: &str) -> bool {
     let lines: Vec<&str> = text.lines().map(str::trim).collect();
     lines.iter().enumerate().filter(|(_, line)| line.starts_with(&format!("fn {name}("))).any(|(at, _)| {
@@ -102,8 +102,8 @@ fn tests(text: &str, name: &str) -> bool {
     })
 }
 
-/// What is wrong with the names in a cell: each has to be a file or a folder, or something in the file before it. Formulas are
-/// not names.
+/// Returns the errors in the names of a cell: each has to be a file or a folder, or something in the file before it.
+/// Formulas are not names.
 fn missing(cell: &str, folders: &[&str], has: fn(&str, &str) -> bool) -> Vec<String> {
     let mut wrong = vec![];
     let mut current: Option<(&str, String)> = None;

@@ -40,7 +40,7 @@ const JOINTS: usize = 12;
 /// The range of no number: what is added to it is all there is.
 const NEVER: RangeInclusive<u64> = RangeInclusive::new(u64::MAX, 0);
 
-/// What came of one fault, over all joints and instants.
+/// The results of one fault, over all joints and instants.
 struct Row {
     fault: Fault,
     what: &'static str,
@@ -75,7 +75,7 @@ fn in_words(range: &RangeInclusive<u64>) -> String {
     }
 }
 
-/// How the torque went.
+/// The course of the torque.
 struct End {
     off: u64,
     fastest_rad_s: f64,
@@ -478,7 +478,8 @@ fn the_table_of_faults_is_that_of_the_code() {
     generated::check(DOCUMENT, "faults", &generated::table(head, &rows));
 }
 
-/// How well each fingertip presses in a tick, against the same grasp without a fault: largest relative difference.
+/// Returns the error of each fingertip's force in a tick, against the same grasp without a fault: largest relative
+/// difference.
 fn force_error(outcome: &Outcome, healthy: &Outcome, tick: usize) -> f64 {
     let forces = |outcome: &Outcome| {
         outcome.run.samples[tick].contacts.iter().map(|c| c.normal_force_n).collect::<Vec<_>>()
@@ -549,7 +550,7 @@ fn pushed(scene: &Scene, fingertips: usize, forces_n: &[f64]) -> Vec<Course> {
     courses
 }
 
-/// What became of pushed hands.
+/// The results of pushed hands.
 #[derive(Default)]
 struct Pushed {
     /// Hands without a fault whose grasp survives the push, or would, ...
@@ -707,8 +708,9 @@ fn nothing_is_found_where_nothing_is_wrong() {
     assert!(outcome.found().is_none() && outcome.run.summary.settled, "a minute");
 }
 
-/// What the joints do is told from the torques that were asked for and the turns that were counted: a motor the wrong way
-/// round looks like somebody who pushes: the potentials rise, and the excess is nothing. docs/safety.md says so.
+/// The work of the joints is told from the torques that were asked for and the turns that were counted: a motor the
+/// wrong way round looks like somebody who pushes: the potentials rise, and the excess is nothing. docs/safety.md says
+/// so.
 #[test]
 fn a_reversed_motor_is_not_seen_by_its_work() {
     let scene = scene("cube", &["duration_s=1"]);

@@ -1,5 +1,5 @@
-//! What the images for the microcontroller are made of, read from their ELF: no way to a panic from the control task, no
-//! double precision, no allocator, no semihosting where it would stop a real board, room to spare, and stack enough.
+//! The images for the microcontroller, read from their ELF: no way to a panic from the control task, no double
+//! precision, no allocator, no semihosting where it would stop a real board, room to spare, and stack enough.
 //!
 //!     cargo test --release -p blindgrasp-tests --features firmware --test firmware
 
@@ -119,7 +119,7 @@ fn the_stack_has_room_for_the_start_of_a_hand_with_16_joints() {
     assert!(u64::from(start) < reserved.expect("both ends"), "{start} of {reserved:?}");
 }
 
-/// What an image takes, as it is written down.
+/// Returns the sizes of the images, as they are written down.
 fn measured() -> BTreeMap<String, u64> {
     let mut measured = BTreeMap::new();
     for kind in ["hand", "pil"] {

@@ -49,7 +49,7 @@ const FINGER_DAMPING: [&[f64]; 3] = [
     &[0.648e-2, 0.780e-2, 0.318e-2, 0.099e-2],
 ];
 
-/// Where the fingers stand, which the tables don't say: around the palm, rad, and from its axis, m.
+/// The places of the fingers, which the tables don't say: around the palm, rad, and from its axis, m.
 const AZIMUTHS_DEGREES: [f64; 3] = [-87.0, 153.0, 33.0];
 const PALM_RADIUS_M: f64 = 0.2556;
 

@@ -32,7 +32,7 @@ use std::time::{Duration, Instant};
 const USUAL: Pace = Pace::Instructions { each_ns: 16 };
 /// 128 ns an instruction: so slow that the control task still has its time, but a record is not sent within a tick.
 const SLOW: Pace = Pace::Instructions { each_ns: 128 };
-/// What a board without counters finds.
+/// The fault of a board without counters.
 const NO_COUNTER: Raised = Raised { fault: Fault::SampleMissing, joint: Some(0) };
 
 /// A board that answers.
@@ -370,7 +370,8 @@ fn a_burst_of_requests_is_answered_one_by_one() {
     }
 }
 
-/// What a board says to a payload that it should not have got: of a session that never was, or no request at all.
+/// Returns the answer of a board to a payload that it should not have got: of a session that never was, or no request
+/// at all.
 fn answer_to(payload: &[u8]) -> (u16, Refusal) {
     match message::Packet::<JOINTS>::decode(payload) {
         Ok(packet) => {

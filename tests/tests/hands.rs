@@ -22,7 +22,8 @@ fn run(scene: &Scene) -> Run {
     Simulation::new(scene).expect("the scene can be simulated").run(|_| {})
 }
 
-/// How far from Eq. 57 friction of the joints lets the normal force of each finger come to rest, N, if it held nothing else.
+/// Returns how far from Eq. 57 friction of the joints lets the normal force of each finger come to rest, N, if it held
+/// nothing else.
 fn held_by_friction_n(scene: &Scene, run: &Run) -> Vec<f64> {
     let last = run.samples.last().expect("it ran");
     let mut angles = [0.0; MAX_JOINTS];

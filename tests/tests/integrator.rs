@@ -91,20 +91,20 @@ fn dissipation_w(grasp: &Grasp, plant: &Plant) -> f64 {
     power + contact_power_w(plant)
 }
 
-/// What a run does to the energy.
+/// The energies of a run.
 #[derive(Clone, Copy, Debug)]
 struct Ledger {
     /// Largest rise in one step, J.
     rise_j: f64,
     /// Largest error of one step: what energy changed by beyond what the dampers took, J.
     step_error_j: f64,
-    /// That of the whole run, J.
+    /// Error of the whole run, J.
     error_j: f64,
     initial_j: f64,
     final_j: f64,
 }
 
-/// How long torsion takes to forget that it started from rest, s: see [`energy_falls_by_what_the_dampers_take`].
+/// Time that torsion takes to forget that it started from rest, s: see [`energy_falls_by_what_the_dampers_take`].
 const START_S: f64 = 0.05;
 
 /// Runs for a time; the errors of single steps count from [`START_S`] on.

@@ -89,7 +89,7 @@ fn words(text: &str) -> String {
     text.trim().trim_end_matches('.').to_owned()
 }
 
-/// What `T` is read into from these entries, written again.
+/// Returns what `T` is read into from these entries, written again.
 fn effective<T: DeserializeOwned + Serialize>(entries: &Map<String, Value>) -> Result<Value, String> {
     let read: T =
         serde_json::from_value(Value::Object(entries.clone())).map_err(|error| error.to_string())?;

@@ -241,7 +241,7 @@ fn axes_near_the_parents_are_no_special_case() {
     assert!(errors.largest() < 1e-13);
 }
 
-/// How a joint stands to its parent in [`bundle`], and how often it does.
+/// The relations of joints to their parents in [`bundle`], with their numbers.
 #[derive(Debug, Default)]
 struct Kinds {
     parallel: usize,

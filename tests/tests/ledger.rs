@@ -10,7 +10,7 @@ use blindgrasp_tests::supervised::{Course, Turned, config, push_nm, run, run_wit
 use nalgebra::Vector3;
 use std::f64::consts::TAU;
 
-/// Where the ledger's work may differ from that of the motors, J.
+/// Returns the allowed difference of the ledger's work from that of the motors, J.
 ///
 /// - Turns are whole counts, each off by half a count at most. Summed by parts, that is half a count of each joint times all
 ///   the changes of its torque.
@@ -63,7 +63,7 @@ fn the_work_is_that_of_the_motors_and_the_books_close() {
     }
 }
 
-/// What excess a tick adds, from the records of the last and of this one, J.
+/// Returns the excess that a tick adds, from the records of the last and of this one, J.
 fn added_j(last: &Turned, now: &Turned, period_s: f64) -> f64 {
     let [last_j, now_j] = [last.excess, now.excess].map(f64::from);
     now_j - last_j * (1.0 - period_s)

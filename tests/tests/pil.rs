@@ -61,7 +61,7 @@ fn scene(name: &str, ticks: u32, settings: &[&str]) -> Scene {
     scene
 }
 
-/// What came of a run with the firmware.
+/// The results of a run with the firmware.
 struct Looped {
     run: Run,
     bits_differ: u64,
@@ -106,7 +106,7 @@ fn bits(sample: &PlantSample) -> Vec<u64> {
     joints.chain(sample.position_m.iter().copied()).map(f64::to_bits).collect()
 }
 
-/// That two runs are the same to the bit.
+/// Asserts that two runs are the same to the bit.
 fn assert_same(a: &Run, b: &Run) {
     assert_eq!(a.samples.len(), b.samples.len());
     for (a, b) in a.samples.iter().zip(&b.samples) {
@@ -219,11 +219,11 @@ fn finds(scene: &Scene, injections: &[Injection], expected: Raised) -> u64 {
     found_at.checked_sub(injections[0].at_tick).expect("not before it happens")
 }
 
-/// How long the firmware takes to let go.
+/// Ticks that the firmware takes to let go.
 const RELEASE_TICKS: u64 = 300;
 
-/// That there is no torque from two ticks after a fault on, or after a release that it begins: what the tick that finds it
-/// computes, acts in the next.
+/// Asserts that there is no torque from two ticks after a fault on, or after a release that it begins: what the tick
+/// that finds it computes, acts in the next.
 fn has_no_torque(run: &Run, release_ticks: u64) {
     let (found_at, raised) = run.first_fault.expect("a fault");
     for sample in run.samples.iter().skip((found_at + release_ticks) as usize + 2) {
@@ -313,7 +313,7 @@ fn a_torque_at_its_limit_for_long_is_found_in_the_same_tick_as_on_the_host() {
     assert_same(&looped.run, &twin(&scene, &[]));
 }
 
-/// What is refused while the hand is disarmed and in order, which the image `hand` in QEMU never is.
+/// Refusals while the hand is disarmed and in order, which the image `hand` in QEMU never is.
 #[test]
 fn values_that_are_no_good_are_refused_by_name() {
     let mut client = Client::new(piped(DEFAULT_HAND), Patience::default());
@@ -410,7 +410,7 @@ fn greeted() -> Conversation<Emulated> {
     host
 }
 
-/// What the image `pil` says to what it is sent, as far as it is not in the records.
+/// An answer of the image `pil`, as far as it is not in the records.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Said {
     Answer(u16, Option<Refusal>),
@@ -512,7 +512,7 @@ fn a_million_damaged_frames_cost_those_and_no_other() {
     );
 }
 
-/// What the parts of a tick take: within limits, the same in every run, and as written down.
+/// The instructions of the parts of a tick: within limits, the same in every run, and as written down.
 #[test]
 fn instructions_are_within_limits_and_as_written_down() {
     const MOST: [(&str, u64); 6] = [

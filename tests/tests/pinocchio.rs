@@ -24,7 +24,7 @@ fn rows(m: &Matrix3<f64>) -> Value {
     json!(m.row_iter().map(|row| row.iter().copied().collect::<Vec<f64>>()).collect::<Vec<_>>())
 }
 
-/// What we compute of a hand in a posture.
+/// Returns our values of a hand in a posture.
 fn values(hand: &Hand, angles_rad: &[f64; MAX_JOINTS]) -> Value {
     let count = hand.joint_count();
     let (mut posture, mut bodies) = (Posture::at_base(), [Body::NONE; MAX_JOINTS]);
@@ -57,7 +57,7 @@ fn values(hand: &Hand, angles_rad: &[f64; MAX_JOINTS]) -> Value {
     })
 }
 
-/// What a script of Python says of two files in a folder of their own.
+/// A script of Python for two files in a folder of their own.
 struct Script {
     folder: PathBuf,
     path: PathBuf,

@@ -243,8 +243,8 @@ fn thirty_faces_are_searched_for_two_to_five_fingers() {
     }
 }
 
-/// What the terms of the quality say about the outcome: of placements that are not all the best.
-/// `cargo test --release -p blindgrasp-tests --test polyhedra terms -- --ignored --nocapture`
+/// The terms of the quality against the outcome: of placements that are not all the best. `cargo test --release -p
+/// blindgrasp-tests --test polyhedra terms -- --ignored --nocapture`
 #[test]
 #[ignore = "takes a minute; prints the evidence for the ranking"]
 fn terms_of_the_quality_predict_the_outcome() {

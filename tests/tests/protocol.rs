@@ -67,7 +67,7 @@ fn frame(message: &impl Serialize) -> Vec<u8> {
 /// Nothing limits a joint.
 const NOTHING: &[Limit] = &[];
 
-/// What a receiver makes of a frame.
+/// Returns the payload that a receiver takes from a frame.
 fn received(frame: &[u8]) -> Result<Vec<u8>, FrameError> {
     let mut receiver = Receiver::<ROOM>::new();
     let (last, before) = frame.split_last().expect("there are bytes");
@@ -489,7 +489,7 @@ fn the_vectors_are_those_of_the_code() {
 
 // ----------------------------------------------------------------------------------------------------------- Document
 
-/// What a unit variant is called and has as its number.
+/// Returns the names of unit variants, with their numbers.
 fn numbered<T: std::fmt::Debug>(values: &[T], words: impl Fn(&T) -> &'static str) -> Vec<[String; 3]> {
     let row = |(k, value): (usize, &T)| [k.to_string(), format!("`{value:?}`"), words(value).to_owned()];
     values.iter().enumerate().map(row).collect()

@@ -1,4 +1,4 @@
-//! What pushes the object from outside (`[[plant.push]]`): the books close with its work, and it moves what it should.
+//! Pushes at the object from outside (`[[plant.push]]`): the books close with its work, and it moves what it should.
 
 use blindgrasp::body::Push;
 use blindgrasp::body::dynamics::JointVector;

@@ -11,10 +11,10 @@ use std::thread;
 use std::time::{Duration, Instant};
 
 const VECTORS: &str = "tests/data/wire/vectors.json";
-/// How long the client may take; it has limits of its own, which are shorter.
+/// Longest time that the client may take; it has limits of its own, which are shorter.
 const PATIENCE: Duration = Duration::from_secs(180);
 
-/// What the client does.
+/// Runs the client.
 fn client(arguments: &[&str]) -> Output {
     let mut child = Command::new("python3")
         .arg("examples/python/blindgrasp_client.py")
@@ -61,7 +61,7 @@ fn said(arguments: &[&str]) -> (Option<i32>, String, String) {
     (output.status.code(), out, err)
 }
 
-/// What it said when all went well.
+/// Returns the client's output when all went well.
 fn done(arguments: &[&str]) -> (String, String) {
     let (code, out, err) = said(arguments);
     assert_eq!(code, Some(0), "{arguments:?}: {out}{err}");
@@ -186,7 +186,7 @@ mod emulated {
         serde_json::from_str(line).unwrap_or_else(|error| panic!("{error}: {text}"))
     }
 
-    /// That a grasp in lockstep went as it should.
+    /// Asserts that a grasp in lockstep went as it should.
     fn assert_grasped(out: &str) {
         let result = last(out);
         println!("{result}");

@@ -18,9 +18,9 @@ use blindgrasp_tests::images::{DEFAULT_HAND, kept_image};
 use std::time::{Duration, Instant};
 use tempfile::TempDir;
 
-/// How long the firmware is recorded.
+/// Time for which the firmware is recorded.
 const TIME: Duration = Duration::from_secs(6);
-/// How long it may take to begin.
+/// Longest time until it begins.
 const START: Duration = Duration::from_secs(30);
 
 #[test]

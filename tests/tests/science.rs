@@ -1,4 +1,4 @@
-//! What a right implementation of the paper shows: the shipped scenes, run as `blindgrasp sim` runs them.
+//! The results of a right implementation of the paper: the shipped scenes, run as `blindgrasp sim` runs them.
 
 use blindgrasp::model::Scene;
 use blindgrasp::sim::summary::Summary;

@@ -1,5 +1,5 @@
-//! What of the telemetry at full rate gets through: the device, the queues of the firmware, and a line that takes so many
-//! bytes a millisecond.
+//! The share of the telemetry at full rate that gets through: the device, the queues of the firmware, and a line that
+//! takes so many bytes a millisecond.
 //!
 //!     cargo test --release -p blindgrasp-tests --test telemetry -- --show-output
 
@@ -50,12 +50,12 @@ struct Line {
     signals: Signals,
     receiver: Receiver<2048>,
     collector: Collector,
-    /// What the device did since it was looked at, for comparison.
+    /// The device's records since it was looked at, for comparison.
     computed: VecDeque<Record<MAX_JOINTS>>,
     heard: Heard,
 }
 
-/// What came at the other end.
+/// The records at the other end.
 #[derive(Default)]
 struct Heard {
     full: u64,
@@ -277,7 +277,7 @@ impl Controller for Line {
     }
 }
 
-/// How hard the fingers are shaken, N m: five times as much loses the cube.
+/// Torque by which the fingers are shaken, N m: five times as much loses the cube.
 const SHAKE_NM: f32 = 0.004;
 
 fn hand_config() -> Config<MAX_JOINTS> {
@@ -381,7 +381,7 @@ fn the_rate_of_records_goes_up_again() {
     assert_eq!((line.dropped, line.heard.missing), (0, 0));
 }
 
-/// What is read out after a fault is whole, whatever the line carried meanwhile.
+/// The records that are read out after a fault are whole, whatever the line carried meanwhile.
 #[test]
 fn the_burst_is_at_full_rate_whatever_the_decimation() {
     let mut line = Line::new(&hand_config(), 115_200.0);
