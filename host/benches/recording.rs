@@ -1,4 +1,4 @@
-//! What recording and reading cost: a record of twelve joints.
+//! The cost of recording and reading: a record of twelve joints.
 
 #![allow(clippy::unwrap_used)]
 
@@ -11,7 +11,8 @@ use blindgrasp_shared::link::message::{Form, Reply};
 use criterion::{BatchSize, Criterion, Throughput, criterion_group, criterion_main};
 use std::path::Path;
 
-/// What a hand says while it grasps a cube for so long, as full records or input records; what comes before them comes too.
+/// Returns the payloads of a hand that grasps a cube for so long, as full records or input records; what comes before
+/// them comes too.
 fn said(folder: &Path, duration_s: f64, inputs: bool) -> Vec<Entry> {
     let scene = Scene::load("cube", &[format!("duration_s={duration_s:?}")]).unwrap();
     let path = folder.join("source.mcap");

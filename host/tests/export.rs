@@ -72,7 +72,7 @@ fn csv_rows(bytes: &[u8]) -> (Vec<String>, Vec<Vec<String>>) {
     (header, rows.collect())
 }
 
-/// Whether a field has a cell's value, to the bit.
+/// Returns `true` if a field has a cell's value, to the bit.
 fn is_told(cell: &Cell<'_>, field: &str) -> bool {
     match cell {
         Cell::Missing => field.is_empty(),

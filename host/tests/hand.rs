@@ -36,7 +36,7 @@ impl Folder {
         fs::write(self.0.join(name), text).expect("a file");
     }
 
-    /// What the command says; it has to succeed.
+    /// Returns the output of the command; it has to succeed.
     fn run(&self, arguments: &[&str]) -> (String, String) {
         let output = blindgrasp(self, arguments);
         let (out, err) = (text(&output.stdout), text(&output.stderr));

@@ -20,7 +20,7 @@ use std::time::{Duration, Instant};
 use tempfile::TempDir;
 
 const BLINDGRASP: &str = env!("CARGO_BIN_EXE_blindgrasp");
-/// How long anything may take: machines that do a lot else are slow.
+/// Longest time that anything may take: machines that do a lot else are slow.
 const PATIENCE: Duration = Duration::from_secs(30);
 const ROWS: u16 = 30;
 const COLUMNS: u16 = 100;
@@ -77,7 +77,7 @@ impl Drop for Hand {
 struct Terminal {
     pty: Arc<Pty>,
     screen: Arc<Mutex<vt100::Parser>>,
-    /// Whether nobody takes what the monitor writes.
+    /// `true` if nobody takes what the monitor writes.
     is_stuck: Arc<AtomicBool>,
     child: Child,
     /// Keeps the terminal there when the monitor has ended.
@@ -524,7 +524,7 @@ fn what_is_watched_can_be_recorded_and_played_back() {
     assert!(in_a_row(&shown).contains("no device `hand7` in this recording: it has hand"), "{shown}");
 }
 
-/// Where a recording is: `1.00 of 5.23`.
+/// Returns the position in a recording: `1.00 of 5.23`.
 fn place(screen: &str) -> String {
     let words: Vec<&str> = screen.lines().last().unwrap_or("").split_whitespace().collect();
     words.get(1..4).map_or(String::new(), |words| words.join(" "))

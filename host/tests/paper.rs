@@ -13,7 +13,7 @@ fn blindgrasp(arguments: &[&str]) -> Output {
     Command::new(env!("CARGO_BIN_EXE_blindgrasp")).args(arguments).output().expect("the command")
 }
 
-/// Where the report stays, for a browser to look at: see tests/run.
+/// Returns the folder where the report stays, for a browser to look at: see tests/run.
 fn folder() -> PathBuf {
     let path = Path::new(env!("CARGO_TARGET_TMPDIR")).join("paper");
     let _ = fs::remove_dir_all(&path);

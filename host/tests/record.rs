@@ -22,7 +22,7 @@ use std::thread;
 use std::time::{Duration, Instant};
 use tempfile::TempDir;
 
-/// How long a process may take for what takes a moment.
+/// Longest time that a process may take for what takes a moment.
 const PATIENCE: Duration = Duration::from_secs(20);
 
 /// The command. Where that is allowed, it goes before what else this machine does: real time is measured here.
@@ -186,13 +186,13 @@ fn recorded(out: &Path, links: &[&Path], arguments: &[&str]) -> Command {
     blindgrasp(&all)
 }
 
-/// What a file holds of a device.
+/// The content of a file on a device.
 #[derive(Default)]
 struct Content {
     records: Vec<Decoded>,
     sessions: usize,
     settings: usize,
-    /// How many records were there before each gap.
+    /// The numbers of records before each gap.
     gaps: Vec<usize>,
     /// Ticks of whole snapshots.
     snapshots: Vec<u32>,
@@ -249,7 +249,7 @@ fn assert_whole(records: &[Decoded]) {
     }
 }
 
-/// What the other commands make of a recording without a gap: the same bits again, and a row a record.
+/// Asserts the results of the other commands for a recording without a gap: the same bits again, and a row a record.
 fn assert_replayed_and_exported(path: &Path, records: &[Decoded]) {
     let file = path.to_str().expect("UTF-8");
     let run = |arguments: &[&str]| {

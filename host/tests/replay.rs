@@ -389,7 +389,7 @@ fn recorded_folder(what: impl FnOnce(&mut Session)) -> (TempDir, PathBuf) {
     (folder, path)
 }
 
-/// Whether the decoder of recordings and a controller's own state agree on angles.
+/// The decoder of recordings and a controller's own state agree on angles.
 #[test]
 fn angles_of_a_recording_are_those_of_the_controller() {
     let (_folder, path) = folder();

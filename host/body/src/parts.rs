@@ -2,7 +2,7 @@
 
 use nalgebra::{Matrix3, Vector3};
 
-/// What a fingertip is made of.
+/// The material of a fingertip.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FingertipModel {
     /// Radius `r_i`, m.
@@ -43,9 +43,9 @@ pub struct JointFriction {
 /// A force and a moment on the object, for a while.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Push {
-    /// When it begins, s from the plant's start.
+    /// Its beginning, s from the plant's start.
     pub from_s: f64,
-    /// How long it lasts, s.
+    /// Its length, s.
     pub for_s: f64,
     /// Time in which it rises at its beginning, and falls at its end, s; at most half of its length.
     pub rise_s: f64,

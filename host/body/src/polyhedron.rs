@@ -60,12 +60,12 @@ pub struct Polyhedron {
     pub faces: Vec<Face>,
 }
 
-/// What counts as flat on a mesh.
+/// The tolerances within which a part of a mesh is flat.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Flatness {
-    /// How far neighbours in a face may tilt against each other, rad.
+    /// Largest angle between neighbours in a face, rad.
     pub angle_rad: f64,
-    /// How far parts of a face may be off its plane, m: root mean square over each of them.
+    /// Largest distance of a face's parts from its plane, m: root mean square over each of them.
     pub distance_m: f64,
 }
 

@@ -1,5 +1,5 @@
-//! Where the image of a hand's firmware comes from: inside the repository, it is built, which takes no time where nothing
-//! has changed. Elsewhere somebody has to say where it is.
+//! The image of a hand's firmware: inside the repository, it is built, which takes no time where nothing has changed.
+//! Elsewhere somebody has to say where it is.
 
 use blindgrasp_model::{HandFile, HandModel};
 use serde::Deserialize;
@@ -13,10 +13,10 @@ use std::process::{Command, Stdio};
 const DEFAULT_HAND: &str = "three-finger";
 /// Decides which compiler builds for the microcontroller, and runs a command with it.
 const TOOLCHAIN: &str = "tests/firmware-toolchain";
-/// Which hand the image is for, told to the build.
+/// The variable that tells the build which hand the image is for.
 const HAND: &str = "HAND";
 
-/// Why there is no image.
+/// An error in getting an image.
 #[derive(Debug, thiserror::Error)]
 pub enum BuildError {
     /// This is no place to build in.
@@ -29,7 +29,7 @@ pub enum BuildError {
     Hand {
         /// The file.
         path: PathBuf,
-        /// Why not.
+        /// The cause.
         source: io::Error,
     },
     /// The build could not be started.
@@ -73,7 +73,7 @@ fn repository(folder: &Path) -> Option<&Path> {
     })
 }
 
-/// What the build is to be told for the hand: nothing, for the one that it takes anyway.
+/// Returns the hand's file that the build is told: nothing, for the one that it takes anyway.
 fn hand_file(root: &Path, hand: &HandModel, file: &HandFile) -> Result<Option<PathBuf>, BuildError> {
     let built_in = |name: &str| HandModel::load(name).is_ok_and(|known| known.hash() == hand.hash());
     if hand.name == DEFAULT_HAND && built_in(DEFAULT_HAND) {

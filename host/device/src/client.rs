@@ -22,12 +22,12 @@ const CRC_BYTES: usize = 4;
 const MOST_RECEIVED: usize = Reply::<MAX_JOINTS>::MOST_BYTES + CRC_BYTES;
 /// Most bytes of a request on the wire.
 const MOST_SENT: usize = most_bytes(Packet::MOST_BYTES);
-/// How long one knock waits.
+/// Time for which one knock waits.
 const KNOCK: Duration = Duration::from_millis(250);
 /// A request that there is none of.
 const NO_REQUEST: u8 = 0x7f;
 
-/// How long to wait.
+/// Times to wait.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Patience {
     /// For the firmware to start.
@@ -42,7 +42,7 @@ impl Default for Patience {
     }
 }
 
-/// What went over the line.
+/// Counts of the traffic on the line.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Traffic {
     /// Frames sent.
@@ -76,45 +76,45 @@ impl fmt::Display for Traffic {
     }
 }
 
-/// Why there is no answer.
+/// The reason for which there is no answer.
 #[derive(Debug, thiserror::Error)]
 pub enum ClientError {
     /// Nothing answers at all.
     #[error("no firmware answers within {} s (so far {traffic}){}", .waited.as_secs_f64(), because(.trouble))]
     NobodyThere {
-        /// How long it was waited for.
+        /// Time that it was waited for.
         waited: Duration,
-        /// What went over the line.
+        /// The traffic on the line.
         traffic: Traffic,
-        /// What is known of the other end.
+        /// The known trouble of the other end.
         trouble: Option<String>,
     },
     /// It does not answer any more.
     #[error("no answer of the firmware to {request} within {} s (so far {traffic}){}; whether it did the tick is not known, so the run can't go on", .waited.as_secs_f64(), because(.trouble))]
     Silence {
-        /// What was asked for.
+        /// The request.
         request: String,
-        /// How long it was waited for.
+        /// Time that it was waited for.
         waited: Duration,
-        /// What went over the line.
+        /// The traffic on the line.
         traffic: Traffic,
-        /// What is known of the other end.
+        /// The known trouble of the other end.
         trouble: Option<String>,
     },
     /// A tick was done without the request that it should have taken.
     #[error("the firmware did the tick without {request}, which was lost on the way (so far {traffic})")]
     RequestLost {
-        /// What was asked for.
+        /// The request.
         request: String,
-        /// What went over the line.
+        /// The traffic on the line.
         traffic: Traffic,
     },
     /// The line failed.
     #[error("the line to the firmware failed{}", because(.trouble))]
     Line {
-        /// How.
+        /// The cause.
         source: TransportError,
-        /// What is known of the other end.
+        /// The known trouble of the other end.
         trouble: Option<String>,
     },
     /// It speaks another version of the interface.
@@ -141,7 +141,7 @@ pub struct Client<T> {
     receiver: Receiver<MOST_RECEIVED>,
     /// Received, but not yet looked at.
     bytes: Vec<u8>,
-    /// How many of them were.
+    /// The number that was seen.
     seen: usize,
     /// Payload of the last whole frame.
     payload: Vec<u8>,
@@ -162,7 +162,7 @@ impl<T: Transport> Client<T> {
         }
     }
 
-    /// What went over the line so far.
+    /// Returns the traffic on the line so far.
     pub fn traffic(&self) -> &Traffic {
         &self.traffic
     }
@@ -327,7 +327,7 @@ impl<T: Transport> Client<T> {
         }
     }
 
-    /// What it means that there was no answer.
+    /// Returns the error that a missing answer means.
     fn silence(&mut self, packet: Option<&Packet>, source: TransportError) -> ClientError {
         match source {
             TransportError::TimedOut => ClientError::Silence {

@@ -21,9 +21,9 @@ pub const LEAST_STACK_BYTES: u64 = 1024;
 /// A firmware image.
 #[derive(Clone, Debug)]
 pub struct Firmware<'a> {
-    /// What it says it is.
+    /// Its own description.
     pub image: Image<'a>,
-    /// What it occupies, by physical address; none overlap in flash.
+    /// The memory that it occupies, by physical address; none overlap in flash.
     pub segments: Vec<Segment<'a>>,
     /// Address of the control block of SEGGER's Real-Time Transfer, through which it logs.
     pub rtt_control_block: Option<u64>,
@@ -37,23 +37,23 @@ pub struct Firmware<'a> {
 /// A piece of memory that a firmware occupies.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Segment<'a> {
-    /// Where its bytes are stored.
+    /// Address where its bytes are stored.
     pub physical_address: u64,
-    /// Where the firmware uses them.
+    /// Address where the firmware uses them.
     pub virtual_address: u64,
-    /// What is stored; empty for variables that start as zero.
+    /// The bytes that are stored; empty for variables that start as zero.
     pub bytes: &'a [u8],
-    /// How many bytes of memory it takes where it is used.
+    /// Number of bytes of memory that it takes where it is used.
     pub memory_bytes: u64,
 }
 
 impl Segment<'_> {
-    /// Where its bytes are stored.
+    /// Returns the addresses where its bytes are stored.
     pub fn stored(&self) -> Range<u64> {
         self.physical_address..self.physical_address + self.bytes.len() as u64
     }
 
-    /// What it takes where it is used.
+    /// Returns the addresses that it takes where it is used.
     pub fn used(&self) -> Range<u64> {
         self.virtual_address..self.virtual_address + self.memory_bytes
     }
@@ -84,7 +84,7 @@ impl Memory {
         Self { flash, ram: merged, sectors }
     }
 
-    /// What is erased before something is stored: its sectors.
+    /// Returns the addresses that are erased before something is stored: its sectors.
     fn erased(&self, stored: &Range<u64>) -> Range<u64> {
         let touched = self.sectors.iter().filter(|sector| overlap(sector, stored));
         touched.fold(stored.clone(), |all, sector| all.start.min(sector.start)..all.end.max(sector.end))
@@ -95,7 +95,7 @@ impl Memory {
     }
 }
 
-/// What a firmware takes of a chip's memory.
+/// The part of a chip's memory that a firmware takes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Footprint {
     /// Bytes that are stored in flash.
@@ -123,7 +123,7 @@ pub struct ExpectedHand {
     pub hash: u32,
 }
 
-/// Why a file is no firmware image of blindgrasp.
+/// The reason for which a file is no firmware image of blindgrasp.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum ImageError {
     /// It is not an ELF file.
@@ -173,17 +173,17 @@ pub enum ImageError {
     },
 }
 
-/// How to build an image.
+/// The command that builds an image.
 pub const BUILD_HINT: &str = "`tests/firmware-toolchain cargo build -p blindgrasp-firmware --profile firmware --target thumbv7em-none-eabihf`";
 
-/// What an ELF file is built for.
+/// The machine that an ELF file is built for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Machine {
     /// The `e_machine` of its header.
     pub code: u16,
-    /// Whether it is of 64 bits.
+    /// `true` if it is of 64 bits.
     pub wide: bool,
-    /// Whether it is little-endian.
+    /// `true` if it is little-endian.
     pub little_endian: bool,
 }
 
@@ -202,7 +202,7 @@ impl fmt::Display for Machine {
     }
 }
 
-/// Why an image does not fit a chip.
+/// The reason for which an image does not fit a chip.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum FitError {
     /// It would be stored where the chip keeps nothing.
@@ -211,7 +211,7 @@ pub enum FitError {
         check memory.x and --chip", .stored.end - .stored.start, .stored.start, .flash.start, .flash.end
     )]
     NotInFlash {
-        /// What would be stored.
+        /// The addresses that would be stored to.
         stored: Range<u64>,
         /// The chip's flash.
         flash: Range<u64>,
@@ -223,7 +223,7 @@ pub enum FitError {
     FlashTooSmall {
         /// From the start of flash to the end of the image.
         needed_bytes: u64,
-        /// What there is.
+        /// The bytes that there are.
         available_bytes: u64,
     },
     /// Saved parameters would be lost.
@@ -234,11 +234,11 @@ pub enum FitError {
         .saved.start, .saved.end, .stored.end - .stored.start, .stored.start, .erased.start, .erased.end
     )]
     ReachesSaved {
-        /// What would be stored.
+        /// The addresses that would be stored to.
         stored: Range<u64>,
         /// The sectors of that.
         erased: Range<u64>,
-        /// Where parameters are saved.
+        /// The addresses of saved parameters.
         saved: Range<u64>,
     },
     /// Parameters would be saved where the chip keeps nothing.
@@ -247,7 +247,7 @@ pub enum FitError {
         check memory.x and --chip", .saved.start, .saved.end, .flash.start, .flash.end
     )]
     SavedNotInFlash {
-        /// Where parameters are saved.
+        /// The addresses of saved parameters.
         saved: Range<u64>,
         /// The chip's flash.
         flash: Range<u64>,
@@ -255,7 +255,7 @@ pub enum FitError {
     /// Variables are where the chip has no memory.
     #[error("variables are at {address:#010x}, where this chip has no RAM; check memory.x and --chip")]
     NotInRam {
-        /// Where they start.
+        /// The address where they start.
         address: u64,
     },
     /// There are more variables than RAM.
@@ -265,9 +265,9 @@ pub enum FitError {
     RamTooSmall {
         /// From the start of this RAM to the end of the variables.
         needed_bytes: u64,
-        /// What there is.
+        /// The bytes that there are.
         available_bytes: u64,
-        /// Where this RAM starts.
+        /// The address where this RAM starts.
         start: u64,
     },
     /// Nothing is stored where the chip boots.
@@ -283,9 +283,9 @@ pub enum FitError {
         "{room_bytes} bytes are left for the stack below {stack_pointer:#010x}, at least {LEAST_STACK_BYTES} must be; make the variables fewer"
     )]
     NoRoomForStack {
-        /// What is left.
+        /// The bytes that are left.
         room_bytes: u64,
-        /// Where the stack starts.
+        /// The address where the stack starts.
         stack_pointer: u64,
     },
     /// The second word does not lead to an instruction of the image.
@@ -314,7 +314,7 @@ impl Kind {
         }
     }
 
-    /// What it does.
+    /// Returns the purpose of an image in words.
     const fn words(self) -> &'static str {
         match self {
             Self::Hand => "drives the joints of a hand",
@@ -329,7 +329,7 @@ impl fmt::Display for Kind {
     }
 }
 
-/// Why an image, though it is one, is not the right one.
+/// The reason for which an image, though it is one, is not the right one.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum PurposeError {
     /// It speaks another version of the interface.
@@ -340,9 +340,9 @@ pub enum PurposeError {
     /// It is not the image that is wanted.
     #[error("this is the image `{image}`, not `{wanted}`, which {}", .wanted.words())]
     OtherKind {
-        /// What it says that it is.
+        /// Its own name of its kind.
         image: String,
-        /// What it should be.
+        /// The kind that it should be.
         wanted: Kind,
     },
     /// It is for another hand.
@@ -350,9 +350,9 @@ pub enum PurposeError {
         "the image is for the hand `{image}`, not for `{expected}`; build it for that hand with the environment variable HAND"
     )]
     OtherHand {
-        /// What it is for.
+        /// The hand that it is for.
         image: String,
-        /// What it should be for.
+        /// The hand that it should be for.
         expected: String,
     },
     /// It is for another version of the hand.
@@ -398,7 +398,7 @@ impl<'a> Firmware<'a> {
         Ok(Self { image, segments, rtt_control_block: symbol("_SEGGER_RTT"), saved, device })
     }
 
-    /// What is stored in flash: address and bytes.
+    /// Returns the address and bytes of everything that is stored in flash.
     pub fn stored(&self) -> impl Iterator<Item = (u64, &'a [u8])> {
         self.segments
             .iter()
@@ -474,7 +474,7 @@ impl<'a> Firmware<'a> {
         Ok(saved.end - saved.start)
     }
 
-    /// Where variables are, each range within one RAM.
+    /// Returns the addresses of variables, each range within one RAM.
     fn variables(&self, memory: &Memory) -> Result<Vec<Range<u64>>, FitError> {
         let outside_flash =
             |used: &Range<u64>| !(memory.flash.start <= used.start && used.end <= memory.flash.end);
@@ -525,7 +525,7 @@ fn damaged(error: impl fmt::Display) -> ImageError {
     ImageError::Damaged(error.to_string())
 }
 
-/// What is in a file may be anything: for messages, without control characters.
+/// Returns a text from a file, which may be anything: for messages, without control characters.
 fn printable(text: &str) -> String {
     text.chars().take(60).flat_map(char::escape_default).collect()
 }
@@ -617,7 +617,7 @@ fn check_stored(segment: &Segment<'_>, flash: &Range<u64>) -> Result<(), FitErro
     Err(FitError::NotInFlash { stored, flash: flash.clone() })
 }
 
-/// How far the stack can grow downwards.
+/// Returns the room below the stack.
 fn stack_room(stack_pointer: u64, memory: &Memory, variables: &[Range<u64>]) -> Result<u64, FitError> {
     let bottom = memory.ram_with(stack_pointer - 1).map_or(stack_pointer, |ram| ram.start);
     let limit = variables

@@ -1,4 +1,4 @@
-//! Whether the user wants an end (Ctrl-C, or a signal to terminate). What waits for a device asks now and then, so that
+//! The user's wish for an end (Ctrl-C, or a signal to terminate). What waits for a device asks now and then, so that
 //! processes are stopped and temporary files removed on this way out, too.
 
 use std::sync::Once;
@@ -19,7 +19,7 @@ pub fn listen() {
     });
 }
 
-/// Whether the user wants an end.
+/// Returns `true` if the user wants an end.
 pub fn wanted() -> bool {
     WANTED.load(Ordering::Relaxed)
 }

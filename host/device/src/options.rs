@@ -85,8 +85,8 @@ impl Options {
         (self.0 >> PROTECTION_AT) as u8
     }
 
-    /// Whether two words of the flash hold these options: the one of `RDP` and the user's byte, whose bits 0, 1 and 4 mean
-    /// nothing, and the one of the write protection of twelve sectors.
+    /// Returns `true` if two words of the flash hold these options: the one of `RDP` and the user's byte, whose bits 0,
+    /// 1 and 4 mean nothing, and the one of the write protection of twelve sectors.
     fn are_in(self, user: u32, sectors: u32) -> bool {
         const USER: u32 = 0xFFEC;
         const SECTORS: u32 = 0x0FFF;
@@ -102,7 +102,7 @@ impl fmt::Debug for Options {
 
 /// A halted chip, whose words can be read and written.
 pub trait Words {
-    /// Why that failed.
+    /// The error of a failure.
     type Error: Error + 'static;
 
     /// Reads a word.
@@ -118,7 +118,7 @@ pub trait Words {
     fn write(&mut self, address: u64, word: u32) -> Result<(), Self::Error>;
 }
 
-/// Why the level was not set.
+/// The reason for which the level was not set.
 #[derive(Debug, thiserror::Error)]
 pub enum OptionsError<E: Error + 'static> {
     /// The chip is protected.
@@ -146,11 +146,11 @@ pub enum OptionsError<E: Error + 'static> {
         off and on, and set the level again"
     )]
     Differs {
-        /// What was written.
+        /// The options that were written.
         wanted: Options,
-        /// What the flash holds: read protection and user's byte.
+        /// The option bytes of the flash: read protection and user's byte.
         user: u32,
-        /// What the flash holds: write protection.
+        /// The option bytes of the flash: write protection.
         sectors: u32,
     },
     /// The connection broke.

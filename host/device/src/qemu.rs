@@ -28,18 +28,18 @@ use tempfile::TempDir;
 const PROGRAM: &str = "qemu-system-arm";
 /// A board with the microcontroller that images are built for.
 const MACHINE: &str = "netduinoplus2";
-/// What is kept of what QEMU prints, bytes.
+/// The most that is kept of QEMU's output, bytes.
 const KEPT: usize = 4096;
-/// How much of it an error tells, characters.
+/// The most that an error tells of it, characters.
 const TOLD: usize = 400;
-/// How long a process that ends may take to be gone.
+/// Longest time that a process that ends may take to be gone.
 const GONE: Duration = Duration::from_millis(500);
-/// How often is looked.
+/// Time between two looks.
 const LOOK: Duration = Duration::from_millis(2);
-/// How long counting instructions may take.
+/// Longest time that counting instructions may take.
 const BENCH: Duration = Duration::from_secs(120);
 
-/// Why there is no emulated firmware.
+/// The reason for which there is no emulated firmware.
 #[derive(Debug, thiserror::Error)]
 pub enum QemuError {
     /// It is not installed.
@@ -50,7 +50,7 @@ pub enum QemuError {
     Start {
         /// The program.
         program: PathBuf,
-        /// Why.
+        /// The cause.
         source: io::Error,
     },
     /// The image can't be read, or is none.
@@ -58,7 +58,7 @@ pub enum QemuError {
     Image {
         /// Its path.
         path: PathBuf,
-        /// Why not.
+        /// The cause.
         reason: String,
     },
     /// Its folder, pipes or socket could not be made or opened.
@@ -70,9 +70,9 @@ pub enum QemuError {
     /// The firmware does not come up.
     #[error("the firmware did not start within {} s; {said}", .waited.as_secs_f64())]
     TimedOut {
-        /// How long it was waited for.
+        /// Time that it was waited for.
         waited: Duration,
-        /// What QEMU said.
+        /// The output of QEMU.
         said: String,
     },
     /// The user wanted an end.
@@ -81,19 +81,19 @@ pub enum QemuError {
     /// The figures of the benchmark are not as expected.
     #[error("the firmware's figures can't be read: {reason}; {said}")]
     Figures {
-        /// Why.
+        /// The cause.
         reason: String,
-        /// What QEMU said.
+        /// The output of QEMU.
         said: String,
     },
 }
 
-/// How to run an image.
+/// The way to run an image.
 #[derive(Clone, Debug)]
 pub struct Qemu {
     /// The program: a name that is looked for in PATH, or a path.
     pub program: PathBuf,
-    /// How long the firmware may take to start.
+    /// Longest time that the firmware may take to start.
     pub patience: Duration,
     image: PathBuf,
 }
@@ -263,7 +263,7 @@ struct Process {
     child: Child,
     stdout: Tail,
     stderr: Tail,
-    /// Where its pipes or its socket are, until nobody needs their names any more.
+    /// The folder of its pipes or its socket, until their names are needed no more.
     folder: Option<TempDir>,
 }
 
@@ -309,7 +309,7 @@ impl Process {
         }
     }
 
-    /// What is still on its way from a process that is gone.
+    /// Waits for the output that is still on its way from a process that is gone.
     fn let_output_end(&self) {
         let deadline = Instant::now() + GONE;
         while !(self.stdout.is_done() && self.stderr.is_done()) && Instant::now() < deadline {

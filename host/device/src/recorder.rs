@@ -1,5 +1,4 @@
-//! What goes over a line, into a recording: every payload as it is, and between them who the device is and what its
-//! parameters are.
+//! Recording of a line: every payload as it is, and between them who the device is and what its parameters are.
 //!
 //! A [`Recorder`] stands beside a tapped talk and takes its events. In each session it asks, aside, for all parameters and
 //! then for every tick's record and for snapshots of the state; after a parameter was set, for these again, so that a replay
@@ -25,9 +24,9 @@ use std::time::{Duration, Instant};
 const STATUS: Duration = Duration::from_secs(1);
 /// From one record of a burst to the next: 8 bytes a tick, which input records and snapshots leave on the line.
 const BURST: Duration = Duration::from_millis(20);
-/// How long a parameter waits for others that are set together with it.
+/// Time for which a parameter waits for others that are set together with it.
 const SETTLED: Duration = Duration::from_millis(50);
-/// How often something is asked that was not answered.
+/// Number of times that something is asked that was not answered.
 const TRIES: u8 = 3;
 /// Said of a session that was not the only one.
 pub const ENDED_ANOTHER: &str =
@@ -41,11 +40,11 @@ const WAITING: usize = 1 << 16;
 /// Something to be written; none at the end.
 type Entry = Box<dyn FnOnce(&mut Writer) -> Result<(), RecordingError> + Send>;
 
-/// What the writing thread has to tell.
+/// News of the writing thread.
 #[derive(Default)]
 struct Told {
     saved: Saved,
-    /// Why nothing is written any more, until somebody was told.
+    /// The error for which nothing is written any more, until it was told.
     error: Option<RecordingError>,
 }
 
@@ -109,7 +108,7 @@ impl Recording {
         recorder
     }
 
-    /// What is in the file.
+    /// Returns the contents of the file so far.
     pub fn saved(&self) -> Saved {
         lock(&self.told).saved
     }
@@ -155,7 +154,7 @@ fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// What became of a device's records.
+/// The totals of a device's records.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Totals {
     /// Sessions.
@@ -179,7 +178,7 @@ pub struct Totals {
 }
 
 impl Totals {
-    /// Whether every record that was asked for is there.
+    /// Returns `true` if every record that was asked for is there.
     pub fn is_whole(&self) -> bool {
         self.missing == 0 && self.dropped == 0 && self.gaps == 0
     }
@@ -195,7 +194,7 @@ impl Totals {
     }
 }
 
-/// How far it has come with a device.
+/// The progress with a device.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Phase {
     /// No session.
@@ -231,10 +230,10 @@ pub struct Recorder {
     /// Payload of the last introduction.
     identity: Vec<u8>,
     phase: Phase,
-    /// How often parameters or records were asked for in vain.
+    /// The number of times that parameters or records were asked for in vain.
     asked: u8,
     settings: Vec<Setting>,
-    /// When the parameters that were set are written down.
+    /// The time at which the parameters that were set are written down.
     changed: Option<Instant>,
     burst: Option<Burst>,
     status_due: Option<Instant>,
@@ -242,12 +241,12 @@ pub struct Recorder {
 }
 
 impl Recorder {
-    /// Whether everything that is done from now on is recorded.
+    /// Returns `true` if everything that is done from now on is recorded.
     pub fn is_ready(&self) -> bool {
         self.phase == Phase::Records
     }
 
-    /// What became of the records so far, to the last second.
+    /// Returns the totals of the records so far, to the last second.
     pub fn totals(&self) -> Totals {
         *lock(&self.totals)
     }
@@ -554,7 +553,7 @@ impl Recorder {
     }
 }
 
-/// Whether a payload is an introduction.
+/// Returns `true` if a payload is an introduction.
 fn is_identity(payload: &[u8]) -> bool {
     payload.first() == Some(&0)
 }

@@ -48,7 +48,7 @@ const HEARTBEATS: f32 = 3.0;
 const HEARTBEAT_MOST_MS: f32 = 300.0;
 /// From one look at what is to be agreed about the rate to the next.
 const RATE_TURN: Duration = Duration::from_millis(10);
-/// How long a `Stop` may be unanswered before it is sent again, and how often it is sent.
+/// Time for which a `Stop` may be unanswered before it is sent again, and the number of times that it is sent.
 const STOP_AGAIN: Duration = Duration::from_millis(100);
 const STOPS: u8 = 5;
 /// Requests that may be unanswered at once, besides heartbeats; the firmware has room for eight.
@@ -61,10 +61,10 @@ pub const fn telemetry(decimation: u16) -> Request {
     Request::Telemetry { decimation, signals: Signals::ALL }
 }
 
-/// How long to wait for a hand: it is there, and answers within a tick or two.
+/// Longest time to wait for a hand: it is there, and answers within a tick or two.
 pub const PATIENCE: Patience = Patience { start: Duration::from_secs(3), answer: Duration::from_secs(1) };
 
-/// What happened.
+/// An event of a talk.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Event {
     /// A session began, and the line's rate is agreed.
@@ -100,7 +100,7 @@ pub enum Event {
     Damaged,
 }
 
-/// Why there is no talk any more.
+/// The reason for which a talk has ended.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum TalkError {
     /// Nothing that answers.
@@ -127,7 +127,7 @@ pub enum TalkError {
     Silence(Duration, Traffic),
 }
 
-/// What came over the line instead of answers.
+/// Returns the words for what came over the line instead of answers.
 fn heard(traffic: &Traffic) -> String {
     match traffic {
         Traffic { frames_received: 0, frames_damaged: 0, bytes_received: 0, .. } => String::new(),
@@ -138,7 +138,7 @@ fn heard(traffic: &Traffic) -> String {
     }
 }
 
-/// Who wants to know what becomes of a request.
+/// The asker who is told what becomes of a request.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Asker {
     /// Nobody but the talk itself.
@@ -153,7 +153,7 @@ struct Asked {
     request: Request,
     asker: Asker,
     deadline: Instant,
-    /// How often it may still be sent.
+    /// The number of times that it may still be sent.
     again: u8,
 }
 
@@ -178,13 +178,13 @@ pub struct Talk {
     sequence: u16,
     /// Since when hello is said.
     begun: Instant,
-    /// When the last good frame came.
+    /// The time of the last good frame.
     heard: Instant,
-    /// When the next hello, or heartbeat, is due.
+    /// The time at which the next hello, or heartbeat, is due.
     due: Instant,
     heartbeat: Duration,
     waiting: VecDeque<(Request, Asker)>,
-    /// What waits for those.
+    /// The requests that wait for those.
     aside: VecDeque<Request>,
     asked: Vec<Asked>,
     outgoing: Vec<u8>,
@@ -368,12 +368,12 @@ impl Talk {
         Ok(())
     }
 
-    /// When [`Self::turn`] has something to do next, at the latest.
+    /// Returns the time at which [`Self::turn`] has something to do next, at the latest.
     pub fn due(&self) -> Instant {
         self.asked.iter().map(|asked| asked.deadline).fold(self.due, Instant::min)
     }
 
-    /// What is to be sent; it counts as sent.
+    /// Returns the bytes that are to be sent; they count as sent.
     pub fn outgoing(&mut self) -> Vec<u8> {
         self.traffic.bytes_sent += self.outgoing.len() as u64;
         std::mem::take(&mut self.outgoing)
@@ -384,7 +384,7 @@ impl Talk {
         self.events.pop_front()
     }
 
-    /// Whether there is a session, and everything that was asked is answered.
+    /// Returns `true` if there is a session, and everything that was asked is answered.
     pub fn is_idle(&self) -> bool {
         self.session.is_some()
             && self.rate.is_settled()
@@ -392,7 +392,7 @@ impl Talk {
             && !self.asked.iter().any(|asked| asked.asker == Asker::User)
     }
 
-    /// What went over the line.
+    /// Returns the traffic on the line.
     pub fn traffic(&self) -> &Traffic {
         &self.traffic
     }
@@ -557,7 +557,7 @@ impl Talk {
     }
 }
 
-/// Why a line could not be opened.
+/// The reason for which a line could not be opened.
 #[derive(Debug, thiserror::Error)]
 pub enum LineError {
     /// It is no serial port that can be used.
@@ -570,7 +570,7 @@ pub enum LineError {
         port: String,
         /// The rate.
         baud: u32,
-        /// What it can do.
+        /// The rates that it can have.
         can: Wanted,
     },
     /// Nobody listens at a socket.
@@ -578,7 +578,7 @@ pub enum LineError {
     Socket {
         /// Its path.
         path: PathBuf,
-        /// Why not.
+        /// The cause.
         source: io::Error,
     },
 }

@@ -6,10 +6,10 @@ use std::io;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
-/// How long nothing is looked at but the line.
+/// Longest time for which nothing is looked at but the line.
 const SLICE: Duration = Duration::from_millis(100);
 
-/// Why bytes could not be sent or received.
+/// The reason for which bytes could not be sent or received.
 #[derive(Debug, thiserror::Error)]
 pub enum TransportError {
     /// Nothing came in time.
@@ -53,7 +53,7 @@ pub trait Transport {
         Ok(())
     }
 
-    /// What is known of the other end that may explain a failure: a sentence or more.
+    /// Returns the known trouble of the other end that may explain a failure: a sentence or more.
     fn trouble(&mut self) -> Option<String> {
         None
     }
@@ -81,7 +81,7 @@ impl<T: Transport + ?Sized> Transport for Box<T> {
     }
 }
 
-/// What is left until the deadline, at most a slice of it.
+/// Returns the time that is left until the deadline, at most a slice of it.
 fn slice(deadline: Instant) -> Result<Duration, TransportError> {
     if interrupt::wanted() {
         return Err(TransportError::Interrupted);
@@ -134,7 +134,7 @@ impl<R: io::Read + std::os::fd::AsFd, W: io::Write + std::os::fd::AsFd> Transpor
     }
 }
 
-/// Whether the other end is gone.
+/// Returns `true` if the other end is gone.
 fn has_hung_up(error: &io::Error) -> bool {
     use io::ErrorKind::{BrokenPipe, ConnectionReset, UnexpectedEof};
     matches!(error.kind(), BrokenPipe | ConnectionReset | UnexpectedEof)
@@ -233,7 +233,7 @@ impl Lock {
     }
 }
 
-/// Why a serial port could not be opened.
+/// The reason for which a serial port could not be opened.
 #[derive(Debug, thiserror::Error)]
 #[error("cannot open the serial port {}: {reason}; {}", .path.display(), ports(.known))]
 pub struct OpenError {
@@ -249,7 +249,7 @@ fn known_ports() -> Vec<PathBuf> {
     known
 }
 
-/// What serial ports there are, in words: `this machine has ...`.
+/// Returns the serial ports of this machine, in words: `this machine has ...`.
 pub fn ports_in_words() -> String {
     ports(&known_ports())
 }
@@ -338,7 +338,7 @@ impl Transport for SerialPort {
     }
 }
 
-/// Whether the time was up, which is looked at elsewhere.
+/// Returns `true` if the time was up, which is looked at elsewhere.
 fn is_timeout(error: &io::Error) -> bool {
     use io::ErrorKind::{Interrupted, TimedOut, WouldBlock};
     matches!(error.kind(), TimedOut | WouldBlock | Interrupted)

@@ -3,7 +3,7 @@
 use super::error::SceneError;
 use super::file::SCHEMA;
 
-/// What a check gives.
+/// The result of a check.
 pub(super) type Result<T> = std::result::Result<T, SceneError>;
 
 /// Bytes of a name.

@@ -13,7 +13,7 @@ use blindgrasp_shared::tick::Config;
 use nalgebra::Vector3;
 use std::f64::consts::TAU;
 
-/// What the configuration follows from.
+/// The data that the configuration follows from.
 pub(super) struct Setup<'a> {
     pub(super) joints: &'a [JointFile],
     pub(super) control: &'a Control,

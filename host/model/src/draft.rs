@@ -11,7 +11,7 @@ use std::path::Path;
 #[derive(Clone, Debug)]
 pub struct Draft {
     tree: Node,
-    /// What was odd in its files.
+    /// The notices on its files.
     notices: Vec<Notice>,
 }
 

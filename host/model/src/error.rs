@@ -7,7 +7,7 @@ const LONGEST_LINE: usize = 800;
 /// Longer words are not compared, bytes.
 const LONGEST_WORD: usize = 100;
 
-/// Where a value comes from.
+/// The place that a value comes from.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Place {
     /// A file's name, the name of something built in, or `--set`.
@@ -22,7 +22,7 @@ impl Place {
         Self { source: source.into(), line: 0 }
     }
 
-    /// Whether it is in a file, and not on the command line.
+    /// Returns `true` if it is in a file, and not on the command line.
     pub(super) fn is_in_a_file(&self) -> bool {
         !matches!(&*self.source, "--set" | "--vary")
     }
@@ -37,17 +37,17 @@ impl fmt::Display for Place {
     }
 }
 
-/// Why a scene can't be run. One line: `file:line: key: what is wrong; remedy`.
+/// An error for which a scene can't be run. One line: `file:line: key: what is wrong; remedy`.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{}", self.line())]
 pub struct SceneError {
-    /// Where; nowhere for scenes built in code.
+    /// The place; nowhere for scenes built in code.
     pub place: Option<Place>,
     /// The key, as `--set` takes it; empty where it is about the file as a whole.
     pub key: String,
-    /// What is wrong.
+    /// The fault.
     pub problem: String,
-    /// What to do; may be empty.
+    /// The remedy; may be empty.
     pub remedy: String,
 }
 
@@ -78,14 +78,14 @@ impl SceneError {
     }
 }
 
-/// What is odd in a file but can be used. One line: `file:line: what; remedy`.
+/// A notice on something odd in a file that can be used all the same. One line: `file:line: what; remedy`.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Notice {
-    /// Where.
+    /// The place.
     pub place: Place,
-    /// What is odd.
+    /// The oddity.
     pub what: String,
-    /// What to do.
+    /// The remedy.
     pub remedy: String,
 }
 

@@ -42,7 +42,7 @@ pub(super) fn kinematics(file: &HandFile) -> Result<Hand> {
     prepare(file, &tree(file)?)
 }
 
-/// What sits on what, by index.
+/// The tree of joints, by index.
 struct Tree {
     /// Of each joint.
     parents: Vec<Option<usize>>,
@@ -253,7 +253,7 @@ pub(super) fn rotation(rpy_rad: [f64; 3]) -> UnitQuaternion<f64> {
     UnitQuaternion::new_normalize(product)
 }
 
-/// Where everything is for given joint angles.
+/// Returns the posture for given joint angles.
 pub fn posture(hand: &Hand, angles: &[f64]) -> Posture {
     let mut padded = [0.0; MAX_JOINTS];
     for (padded, angle) in padded.iter_mut().zip(angles) {

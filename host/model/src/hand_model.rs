@@ -32,7 +32,7 @@ pub struct HandModel {
     pub config: Config<MAX_JOINTS>,
     /// Torque at each joint for each volt at its amplifier, N m/V.
     pub torques_per_volt_nm_v: Vec<f32>,
-    /// What is odd but can be used, in words.
+    /// Oddities that can be used, in words.
     pub warnings: Vec<String>,
 }
 
@@ -96,8 +96,8 @@ impl HandModel {
         model::hash(&self.bytes())
     }
 
-    /// What a firmware is built with: the hand, its configuration and the scales of its outputs, as [`model`] writes them. The same hand gives the same
-    /// bytes, wherever its file lies.
+    /// Returns the bytes that a firmware is built with: the hand, its configuration and the scales of its outputs, as
+    /// [`model`] writes them. The same hand gives the same bytes, wherever its file lies.
     ///
     /// # Panics
     /// Never: the largest hand fits.

@@ -19,7 +19,7 @@ const STEPS: usize = 300;
 pub struct Unreachable {
     /// Index of the fingertip.
     pub fingertip: usize,
-    /// How far from its target the nearest posture found leaves its centre, m.
+    /// Distance of the centre from its target in the nearest posture found, m.
     pub distance_m: f64,
     /// The joint that is at its limit there, if one is.
     pub limited_by: Option<usize>,
@@ -63,7 +63,7 @@ pub fn place(hand: &Hand, targets_m: &[Vector3<f64>], nominal_rad: &[f64]) -> Re
     Ok(angles[..hand.joint_count()].to_vec())
 }
 
-/// Whether a joint moves more than one fingertip.
+/// Returns `true` if a joint moves more than one fingertip.
 pub fn is_trunk(hand: &Hand, joint: usize) -> bool {
     (0..hand.fingertip_count()).filter(|&fingertip| hand.moves(joint, fingertip)).count() > 1
 }

@@ -85,7 +85,7 @@ pub struct Scene {
     pub inertia_kg_m2: Matrix3<f64>,
     /// The face that each fingertip touches, in the hand's order.
     pub contacts: Vec<FaceContact>,
-    /// Where everything is at the start; all speeds are zero.
+    /// The posture and the places at the start; all speeds are zero.
     pub start: Start,
     /// The controller.
     pub control: Control,
@@ -97,24 +97,24 @@ pub struct Scene {
     pub friction: Friction,
     /// The simulated world.
     pub plant: PlantSettings,
-    /// How many steps of the integrator make one control period.
+    /// The number of steps of the integrator in one control period.
     pub substeps: usize,
-    /// What is odd but can be simulated, in words.
+    /// Oddities that can be simulated, in words.
     pub warnings: Vec<String>,
     /// The effective configuration.
     pub file: SceneFile,
 }
 
-/// What is known of a scene before hand and object meet, checked and prepared.
+/// The parts of a scene before hand and object meet, checked and prepared.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Parts {
     /// Kinematics and link masses of the hand.
     pub hand: Hand,
     /// The object.
     pub object: ObjectBody,
-    /// How many steps of the integrator make one control period.
+    /// The number of steps of the integrator in one control period.
     pub substeps: usize,
-    /// What is odd but can be simulated, in words.
+    /// Oddities that can be simulated, in words.
     pub warnings: Vec<String>,
 }
 
@@ -128,8 +128,8 @@ impl Parts {
     }
 }
 
-/// What the simulator needs to know of a joint besides the [`Hand`]. Torque limit and friction are those that the
-/// scene asks for: switched off, they are infinite and zero.
+/// The parameters of a joint that the simulator needs besides the [`Hand`]. Torque limit and friction are those that
+/// the scene asks for: switched off, they are infinite and zero.
 #[derive(Clone, Debug, PartialEq)]
 pub struct JointParameters {
     /// Its name.
@@ -142,7 +142,7 @@ pub struct JointParameters {
     pub speed_limit_rad_s: f64,
     /// Encoder counts in one turn of the joint.
     pub encoder_counts_per_turn: f64,
-    /// Whether the count falls while the joint turns in its positive direction.
+    /// `true` if the count falls while the joint turns in its positive direction.
     pub encoder_reversed: bool,
     /// The count at joint angle zero.
     pub encoder_zero_count: i32,
@@ -150,7 +150,7 @@ pub struct JointParameters {
     pub friction: JointFriction,
 }
 
-/// Where everything is at the start.
+/// The posture and the places at the start.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Start {
     /// Joint angles, rad.
@@ -263,11 +263,11 @@ impl HandFile {
     }
 }
 
-/// Where the values of a file come from, and what was odd on the way.
+/// The places that the values of a file come from, and the oddities on the way.
 #[derive(Clone, Debug)]
 pub(crate) struct Places {
     tree: Node,
-    /// What is odd in the file, or in what it names.
+    /// Oddities of the file, or of what it names.
     pub(crate) notices: Vec<Notice>,
 }
 

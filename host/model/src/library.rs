@@ -1,4 +1,4 @@
-//! Where files come from: built into the program, or from the disk.
+//! The origin of files: built into the program, or from the disk.
 
 use super::{
     error::{Notice, Place, SceneError, suggestion},
@@ -16,7 +16,7 @@ const LARGEST_TOML: u64 = 32 << 20;
 /// Values of a file, roughly: the largest mesh has 1.2 million. Each takes some hundred bytes while the file is read.
 const MOST_VALUES: usize = 2_000_000;
 
-/// What a file describes.
+/// The content of a file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Kind {
     Scene,
@@ -94,7 +94,7 @@ const BUILT_IN_MESHES: &[(&str, &[u8])] = &[
     ("octahedron.obj", include_bytes!("../../../models/objects/octahedron.obj")),
 ];
 
-/// What the references of a file are relative to.
+/// The place that the references of a file are relative to.
 #[derive(Clone, Debug)]
 pub(super) enum Home {
     /// The program itself.
@@ -277,7 +277,7 @@ pub(super) fn apply(node: &mut Node, settings: &[Setting]) -> Result<(), SceneEr
     })
 }
 
-/// When a setting is applied.
+/// The stage at which a setting is applied.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Stage {
     /// It names the hand or the object: before these are read.
@@ -286,7 +286,7 @@ enum Stage {
     Urdf,
     /// It is about the object's shape: before a mesh is read.
     Shape,
-    /// When everything is read.
+    /// After everything is read.
     Last,
 }
 
@@ -301,12 +301,12 @@ impl Stage {
     }
 }
 
-/// Whether a key has a say in which files a scene is made from.
+/// Returns `true` if a key has a say in which files a scene is made from.
 pub fn is_of_files(key: &str) -> bool {
     Stage::of(key) != Stage::Last
 }
 
-/// Whether a name is that of a file, and not of something built in.
+/// Returns `true` if a name is that of a file, and not of something built in.
 pub(super) fn is_path(name: &str) -> bool {
     name.ends_with(".toml") || name.contains(['/', '\\'])
 }
@@ -358,7 +358,7 @@ fn read_bytes(path: &Path, ending: &str, largest: u64) -> Result<Vec<u8>, SceneE
 }
 
 impl SceneError {
-    /// What keeps a whole file from being read is an error of what names it.
+    /// Turns an error that keeps a whole file from being read into one of what names it.
     pub(super) fn of_reference(self, key: &str, place: &Place) -> Self {
         let problem = match &self.place {
             None => self.problem,

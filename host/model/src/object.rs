@@ -8,7 +8,8 @@ use super::{
 use blindgrasp_body::polyhedron::{Flatness, Polyhedron, PolyhedronError, diagonal_m};
 use nalgebra::{Matrix3, SymmetricEigen, Vector3};
 
-/// How far parts of a face of a mesh may be off its plane, in units of the body's diagonal, where the file does not say.
+/// Largest distance of a face's parts from its plane on a mesh, in units of the body's diagonal, where the file does
+/// not say.
 const FLAT: f64 = 1e-3;
 
 /// An object, checked.
@@ -154,7 +155,7 @@ pub(super) fn tensor(key: &str, file: &InertiaFile) -> Result<Matrix3<f64>> {
     Ok(Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz))
 }
 
-/// Whether a principal moment is larger than the sum of the two others.
+/// Returns `true` if a principal moment is larger than the sum of the two others.
 pub(crate) fn breaks_triangle(inertia: &Matrix3<f64>) -> bool {
     let moments = SymmetricEigen::new(*inertia).eigenvalues;
     2.0 * moments.max() > moments.sum() * (1.0 + 1e-6)

@@ -1,4 +1,4 @@
-//! How a scene begins: where the object is, which faces the fingertips touch, and the posture that puts them there.
+//! The start of a scene: where the object is, which faces the fingertips touch, and the posture that puts them there.
 
 use super::{
     Start,
@@ -14,7 +14,7 @@ use blindgrasp_body::Hand;
 use blindgrasp_body::polyhedron::Polyhedron;
 use nalgebra::{Matrix3, Quaternion, UnitQuaternion, Vector3};
 
-/// How far a contact point may lie off its face before it is an error, m; closer, it is moved onto the face.
+/// Largest distance of a contact point from its face, m; closer, it is moved onto the face.
 const OFF_FACE_M: f64 = 1e-6;
 
 /// Room that a fingertip needs from parts of the object beside its face, m: what the search for the posture leaves open.
@@ -233,7 +233,7 @@ fn touches(file: &SceneFile, shape: &Polyhedron) -> Result<Vec<Touch>> {
     Ok(contacts)
 }
 
-/// Whether every fingertip touches its face alone. Where a body is not convex, it may come to another part of it.
+/// Checks that every fingertip touches its face alone. Where a body is not convex, it may come to another part of it.
 fn unobstructed(
     file: &SceneFile,
     shape: &Polyhedron,

@@ -185,7 +185,7 @@ impl Node {
         }
     }
 
-    /// Where the value of a path comes from: its own place, or that of the nearest thing around it.
+    /// Returns the place that the value of a path comes from: its own place, or that of the nearest thing around it.
     pub(super) fn place_of(&self, key: &str) -> &Place {
         let mut here = self;
         let mut place = &self.place;
@@ -247,7 +247,7 @@ impl Setting {
 /// From byte positions to lines.
 pub(super) struct Lines {
     source: Place,
-    /// Where the lines end, bytes.
+    /// The ends of the lines, bytes.
     breaks: Vec<usize>,
 }
 

@@ -1,5 +1,5 @@
-//! What can be learnt from the payloads on the line alone: the session's number, which heartbeats were answered, and which
-//! numbers of records stand for input records.
+//! The state of the session, learnt from the payloads on the line alone: the session's number, which heartbeats were
+//! answered, and which numbers of records stand for input records.
 
 use super::model::News;
 use blindgrasp_body::MAX_JOINTS;
@@ -22,7 +22,7 @@ pub(super) struct Exchange {
 }
 
 impl Exchange {
-    /// What the host said.
+    /// Takes a payload of the host.
     pub(super) fn sent(&mut self, payload: &[u8]) {
         if let Ok(Packet { sequence, request: Request::Heartbeat, .. }) = Packet::decode(payload) {
             if self.heartbeats.len() == UNANSWERED {

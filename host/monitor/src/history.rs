@@ -1,11 +1,11 @@
-//! What the plots are drawn from: least and greatest value of each signal in each short slot of the last minute.
+//! The data of the plots: least and greatest value of each signal in each short slot of the last minute.
 
 use std::collections::VecDeque;
 use std::time::Duration;
 
-/// What is kept together, ms.
+/// Length of a slot whose values are kept together, ms.
 const SLOT_MS: u128 = 20;
-/// What is kept at all: the longest window.
+/// Length of the history: the longest window.
 pub const SPAN: Duration = Duration::from_secs(60);
 
 /// Least and greatest value.

@@ -5,41 +5,41 @@ use blindgrasp_shared::supervisor::Mode;
 use ratatui::crossterm::event::{KeyCode, KeyEvent, KeyModifiers};
 use std::time::Duration;
 
-/// How long a question waits for its answer.
+/// Time for which a question waits for its answer.
 const PATIENCE: Duration = Duration::from_secs(5);
 /// Of a recording: what an arrow and what a page key skips.
 const STEP: Duration = Duration::from_secs(1);
 const PAGE: Duration = Duration::from_secs(10);
 
-/// What keys mean depends on this.
+/// The situation, on which the meaning of keys depends.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Situation {
-    /// Whether there is a hand, not a recording.
+    /// `true` if there is a hand, not a recording.
     pub is_live: bool,
-    /// Whether it answers.
+    /// `true` if it answers.
     pub is_heard: bool,
     /// The last mode that is known.
     pub mode: Option<Mode>,
 }
 
 impl Situation {
-    /// Whether the joints may have torque: for all that is known.
+    /// Returns `true` if the joints may have torque: for all that is known.
     pub fn may_have_torque(self) -> bool {
         self.is_live && matches!(self.mode, Some(Mode::Armed | Mode::Grasping | Mode::Releasing))
     }
 
-    /// Whether something may be in the hand.
+    /// Returns `true` if something may be in the hand.
     fn may_hold(self) -> bool {
         matches!(self.mode, None | Some(Mode::Grasping | Mode::Releasing))
     }
 }
 
-/// What the user wants.
+/// The intent of the user.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Intent {
     /// Something of the hand.
     Ask(Command),
-    /// That it is stopped, and then an end.
+    /// To stop the hand, and then to end.
     StopAndQuit,
     /// An end.
     Quit,
@@ -65,7 +65,7 @@ pub enum Intent {
     OnlyRecorded,
 }
 
-/// What a question is about.
+/// The subject of a question.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum About {
     Command(Command),
@@ -83,7 +83,7 @@ struct Question {
 #[derive(Clone, Debug, Default)]
 pub struct Input {
     question: Option<Question>,
-    /// Whether Ctrl-C came before.
+    /// `true` if Ctrl-C came before.
     was_interrupted: bool,
 }
 

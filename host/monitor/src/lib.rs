@@ -1,4 +1,4 @@
-//! What `blindgrasp monitor` shows, without a terminal: so that tests can look at it.
+//! The view of `blindgrasp monitor`, without a terminal: so that tests can look at it.
 //!
 //! Arrows go one way. [`live`] (a line with a hand behind it, in a thread of its own) and [`playback`] (a recording) tell
 //! [`News`](model::News), each with its time; the [`Model`](model::Model) keeps what is known from them;

@@ -22,23 +22,23 @@ use std::sync::mpsc::{self, Receiver, RecvTimeoutError, Sender, TryRecvError};
 use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
-/// How long nothing is looked at but the line.
+/// Longest time for which nothing is looked at but the line.
 const SLICE: Duration = Duration::from_millis(10);
-/// How long the line may take no bytes.
+/// Longest time for which the line may take no bytes.
 const SENDING: Duration = Duration::from_secs(1);
 /// From a line that is lost to the next attempt.
 const AGAIN: Duration = Duration::from_millis(500);
-/// How long the news may not be fetched.
+/// Longest time for which the news may stay unfetched.
 const UNWATCHED: Duration = Duration::from_secs(5);
 /// From one count of the bytes to the next.
 const TRAFFIC: Duration = Duration::from_millis(50);
 
-/// What a line tells.
+/// News of a line.
 #[derive(Debug)]
 pub enum Told {
     /// News, and when, since the begin.
     News(Duration, News),
-    /// What became of a stop: whether the hand has confirmed it.
+    /// The result of a stop: `true` if the hand has confirmed it.
     Stopped(bool),
     /// The recording has ended too early.
     Unrecorded(RecordingError),
@@ -50,7 +50,7 @@ pub struct Live {
     orders: Sender<Request>,
     told: Receiver<Told>,
     thread: JoinHandle<()>,
-    /// When the news were fetched last, ms since the begin.
+    /// The time at which the news were fetched last, ms since the begin.
     fetched_ms: Arc<AtomicU64>,
 }
 
@@ -109,7 +109,7 @@ impl Live {
         let _ = self.thread.join();
     }
 
-    /// What was told since, if the line is still being followed.
+    /// Returns the news since the last fetch, if the line is still being followed.
     pub fn fetch(&self) -> Option<Vec<Told>> {
         self.fetched_ms.store(self.now().as_millis() as u64, Ordering::Relaxed);
         let mut told = Vec::new();

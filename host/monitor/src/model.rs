@@ -1,4 +1,4 @@
-//! What is known of a hand: fed with news, each with its time, from a line or from a recording.
+//! The state of a hand as it is known: fed with news, each with its time, from a line or from a recording.
 //!
 //! Its clock is whatever the news come with: of a line, the time since the monitor was started; of a recording, the time
 //! since its beginning. The model does not look at a clock itself.
@@ -26,7 +26,7 @@ const SPEED_TIME_S: f64 = 0.02;
 /// Notices that are kept.
 const NOTICES: usize = 200;
 
-/// How bad something is.
+/// The severity of an event.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Level {
     /// As it should be.
@@ -60,7 +60,7 @@ pub struct Session {
     pub hand: Result<Box<HandModel>, String>,
 }
 
-/// What came to be known.
+/// A piece of news.
 #[derive(Clone, Debug)]
 pub enum News {
     /// A session began.
@@ -76,7 +76,7 @@ pub enum News {
     Heartbeat,
     /// A parameter's value; `None` if what it belongs to is switched off.
     Setting {
-        /// Which.
+        /// The parameter.
         parameter: Parameter,
         /// Of which joint or axis.
         index: u8,
@@ -96,7 +96,7 @@ pub enum News {
     Notice(Level, String),
 }
 
-/// How the link is.
+/// The state of the link.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Link {
     /// Nobody has answered yet.
@@ -107,7 +107,7 @@ pub enum Link {
     Cut {
         /// Since when.
         since: Duration,
-        /// Why, in words.
+        /// The reason, in words.
         words: String,
     },
 }
@@ -115,11 +115,11 @@ pub enum Link {
 /// Something that happened.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Notice {
-    /// When.
+    /// The time.
     pub at: Duration,
-    /// How bad it is.
+    /// Its severity.
     pub level: Level,
-    /// What.
+    /// Its words.
     pub words: String,
 }
 
@@ -140,11 +140,11 @@ pub struct Joint<'m> {
     pub most_nm: Option<f32>,
     /// Speed, rad/s; counts a second where the hand is not known.
     pub speed: Option<f32>,
-    /// What limits its torque.
+    /// The limit that acts on its torque.
     pub limiting: Limiting,
 }
 
-/// What is plotted.
+/// A plot.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Plot {
     /// Torques of the joints.
@@ -171,7 +171,7 @@ impl Plot {
         &ALL
     }
 
-    /// What it is, with the unit.
+    /// Returns its title, with the unit.
     pub fn words(self) -> String {
         match self {
             Self::Torques => "torques, N m".into(),
@@ -194,13 +194,13 @@ impl Plot {
         }
     }
 
-    /// Whether there is one signal a joint.
+    /// Returns `true` if there is one signal a joint.
     pub const fn is_of_joints(self) -> bool {
         matches!(self, Self::Torques | Self::Angles | Self::Speeds)
     }
 }
 
-/// What is known of a hand.
+/// The state of a hand as it is known.
 #[derive(Clone, Debug)]
 pub struct Model {
     link: Link,
@@ -378,7 +378,7 @@ impl Model {
         self.history.add(at, values.into_iter());
     }
 
-    /// How the link is.
+    /// Returns the state of the link.
     pub fn link(&self) -> &Link {
         &self.link
     }
@@ -393,7 +393,7 @@ impl Model {
         self.record.as_ref().map(|(_, record)| record)
     }
 
-    /// When the newest record came.
+    /// Returns the time of the newest record.
     pub fn record_at(&self) -> Option<Duration> {
         self.record.as_ref().map(|&(at, _)| at)
     }
@@ -408,7 +408,7 @@ impl Model {
         self.record().map(|record| record.mode)
     }
 
-    /// Why the hand can't be armed: a sentence.
+    /// Returns the reason for which the hand can't be armed: a sentence.
     pub fn why_not_armed(&self) -> Option<&'static str> {
         if self.link != Link::Open {
             return Some("nobody answers");
@@ -426,7 +426,7 @@ impl Model {
         }
     }
 
-    /// How long the heartbeat may fail, ms; `None`: for ever, or it is not known.
+    /// Returns the longest time for which the heartbeat may be missing, ms; `None`: for ever, or it is not known.
     pub fn heartbeat_ms(&self) -> Option<f32> {
         self.heartbeat_ms
     }
@@ -480,7 +480,7 @@ impl Model {
         1e-6 * f64::from(self.session.as_ref().map_or(1000, |session| session.period_us))
     }
 
-    /// What happened, the newest first.
+    /// Returns the notices, the newest first.
     pub fn notices(&self) -> impl Iterator<Item = &Notice> {
         self.notices.iter().rev()
     }

@@ -14,14 +14,14 @@ use std::time::{Duration, Instant};
 
 /// Bytes of a frame besides its payload: CRC-32, COBS and the end of the frame.
 const FRAME_BYTES: u64 = 4 + 1 + 1;
-/// How much faster it can be played, and slower: so many times twice.
+/// Greatest speed of playing, and least: so many times twice.
 const MOST_DOUBLINGS: i32 = 6;
-/// How long a turn may take to catch up.
+/// Longest time that a turn may take to catch up.
 const TURN: Duration = Duration::from_millis(30);
 /// Entries from one look at the clock to the next.
 const BATCH: usize = 256;
 
-/// Why a recording can't be played.
+/// The reason for which a recording can't be played.
 #[derive(Debug, thiserror::Error)]
 pub enum PlaybackError {
     /// It can't be read.
@@ -30,9 +30,9 @@ pub enum PlaybackError {
     /// It has no such device.
     #[error("there is no device `{name}` in this recording: it has {}", .known.join(", "))]
     NoSuchDevice {
-        /// What was wanted.
+        /// The name that was wanted.
         name: String,
-        /// What there is.
+        /// The names that there are.
         known: Vec<String>,
     },
     /// There is nothing in it.
@@ -54,9 +54,9 @@ pub struct Playback {
     decoder: Decoder,
     exchange: Exchange,
     model: Model,
-    /// How far it should be told.
+    /// The position that it should reach.
     wanted: Duration,
-    /// How far it is.
+    /// The position that it has.
     told: Duration,
     doublings: i32,
     is_paused: bool,
@@ -98,17 +98,17 @@ impl Playback {
         })
     }
 
-    /// What is known where it is.
+    /// Returns the state of the hand at the position.
     pub fn model(&self) -> &Model {
         &self.model
     }
 
-    /// Where it is: time since the beginning of the recording.
+    /// Returns the position: time since the beginning of the recording.
     pub fn position(&self) -> Duration {
         if self.is_seeking() { self.told } else { self.wanted }
     }
 
-    /// How long it is.
+    /// Returns the length of the recording.
     pub fn length(&self) -> Duration {
         Duration::from_nanos(self.end.0.saturating_sub(self.begin.0))
     }
@@ -119,17 +119,17 @@ impl Playback {
         (known.get(self.device).map_or("", String::as_str), known.len())
     }
 
-    /// How much faster than it was it is played.
+    /// Returns the speed of playing, as a multiple of the recording's.
     pub fn speed(&self) -> f64 {
         2.0_f64.powi(self.doublings)
     }
 
-    /// Whether it waits.
+    /// Returns `true` if it waits.
     pub fn is_paused(&self) -> bool {
         self.is_paused
     }
 
-    /// Whether it is still on its way.
+    /// Returns `true` if it is still on its way.
     pub fn is_seeking(&self) -> bool {
         !self.has_ended && self.told < self.wanted
     }

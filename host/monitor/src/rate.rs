@@ -1,9 +1,9 @@
-//! How many a second, lately.
+//! Rates a second of late.
 
 use std::collections::VecDeque;
 use std::time::Duration;
 
-/// What is counted together, ms.
+/// Length of a slot that is counted together, ms.
 const SLOT_MS: u128 = 100;
 /// So many slots are a second.
 const SLOTS: u128 = 10;

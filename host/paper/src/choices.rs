@@ -1,4 +1,4 @@
-//! Where the paper is silent or contradicts itself: what was chosen, and how much the answer hangs on it.
+//! Choices where the paper is silent or contradicts itself: what was chosen, and how much the answer hangs on it.
 
 use super::claim::{number, percent};
 use super::evidence::{Done, Evidence, EvidenceError};
@@ -9,13 +9,13 @@ use serde::Serialize;
 /// A choice.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Choice {
-    /// Where in the paper.
+    /// The place in the paper.
     pub place: &'static str,
-    /// What is printed there, or not.
+    /// The words that are printed there, or not.
     pub printed: &'static str,
-    /// What was chosen.
+    /// The choice.
     pub chosen: &'static str,
-    /// How much hangs on it, with what was measured.
+    /// The weight of the choice, with what was measured.
     pub depends: String,
 }
 
@@ -136,7 +136,7 @@ pub fn all(evidence: &Evidence, sweeps: &[Sweep]) -> Result<Vec<Choice>, Evidenc
     ])
 }
 
-/// How a run ended, in words.
+/// Returns the end of a run, in words.
 fn ends(done: &Done) -> String {
     match (done.summary().lost_at_s, done.summary().settle_time_s) {
         (Some(t_s), _) => format!("{}: lost at {t_s:.1} s", done.name),

@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-/// What became of a claim in one run.
+/// The verdict on a claim in one run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Verdict {
@@ -42,9 +42,9 @@ impl Verdict {
 /// A number that was measured.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Figure {
-    /// What it is.
+    /// Its name.
     pub name: &'static str,
-    /// How much.
+    /// Its value.
     pub value: f64,
     /// Its unit; empty for a ratio.
     pub unit: &'static str,
@@ -62,13 +62,13 @@ impl Figure {
 pub struct Row {
     /// The run, by its name in the plan.
     pub run: String,
-    /// What was measured, in words.
+    /// The measurement, in words.
     pub measured: String,
     /// The numbers.
     pub figures: Vec<Figure>,
     /// The verdict.
     pub verdict: Verdict,
-    /// Where it differs, or fails: why, or with what evidence. Empty where it holds.
+    /// The reason for which it differs, or the evidence that it fails. Empty where it holds.
     pub remark: String,
 }
 
@@ -81,11 +81,11 @@ pub struct Claim {
     pub words: &'static str,
     /// Equation, figure or section.
     pub place: &'static str,
-    /// When it counts as reproduced.
+    /// The criterion by which it counts as reproduced.
     pub criterion: &'static str,
-    /// Why the tolerance is what it is.
+    /// The reason for the tolerance.
     pub tolerance: &'static str,
-    /// What was found.
+    /// The results.
     pub rows: Vec<Row>,
 }
 

@@ -10,7 +10,8 @@ use std::num::NonZeroU64;
 /// Time between samples, s: that of the experiments' servo loop.
 const SAMPLE_S: f64 = 1e-3;
 
-/// Why a run of the plan can't be done. Its scenes are built in, so that this is a fault of the program.
+/// The reason for which a run of the plan can't be done. Its scenes are built in, so that this is a fault of the
+/// program.
 #[derive(Debug, thiserror::Error)]
 pub enum EvidenceError {
     /// The scene.
@@ -18,7 +19,7 @@ pub enum EvidenceError {
     Scene {
         /// The run.
         run: String,
-        /// What is wrong with its scene.
+        /// The error in its scene.
         cause: SceneError,
     },
     /// The simulation.
@@ -26,7 +27,7 @@ pub enum EvidenceError {
     Simulation {
         /// The run.
         run: String,
-        /// What is wrong with its model or gains.
+        /// The error in its model or gains.
         cause: SimulationError,
     },
     /// A sweep.
@@ -34,7 +35,7 @@ pub enum EvidenceError {
     Sweep {
         /// The sweep.
         sweep: &'static str,
-        /// What is wrong with it.
+        /// The error.
         cause: String,
     },
     /// An object that the search finds no grasp for.
@@ -50,13 +51,13 @@ pub enum EvidenceError {
 pub struct Done {
     /// Its name in the plan.
     pub name: String,
-    /// What it is for.
+    /// Its purpose.
     pub what: String,
-    /// What is set in its scene.
+    /// The settings of its scene.
     pub settings: Vec<String>,
     /// Its scene.
     pub scene: Scene,
-    /// What came out; a sample a millisecond.
+    /// The run; a sample a millisecond.
     pub run: Run,
 }
 

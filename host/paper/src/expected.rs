@@ -68,14 +68,14 @@ pub struct Surprise {
     pub claim: String,
     /// The run.
     pub run: String,
-    /// What the table says; `None` if it has no line for it.
+    /// The verdict of the table; `None` if it has no line for it.
     pub expected: Option<Verdict>,
-    /// What came out; `None` if the claim was not checked in this run.
+    /// The verdict that came out; `None` if the claim was not checked in this run.
     pub found: Option<Verdict>,
 }
 
 impl Surprise {
-    /// Whether it came out worse than the documentation says.
+    /// Returns `true` if it came out worse than the documentation says.
     pub fn is_worse(&self) -> bool {
         match (self.expected, self.found) {
             (Some(expected), Some(found)) => found < expected,
@@ -90,7 +90,7 @@ pub fn expected(claim: &str, run: &str) -> Option<Verdict> {
     line(run).or_else(|| line("*")).map(|(_, _, verdict)| *verdict)
 }
 
-/// What differs from the table.
+/// Returns the differences from the table.
 pub fn surprises(claims: &[Claim]) -> Vec<Surprise> {
     let surprise = |claim: &str, run: &str, expected, found| Surprise {
         claim: claim.to_owned(),

@@ -8,13 +8,13 @@ use blindgrasp_plots::{Along, Axis, Dash, Figure, Line, Panel};
 use blindgrasp_sim::sample::Sample;
 use blindgrasp_view::{Files, Report, Strip, colour};
 
-/// When the hand-arm is looked at, s.
+/// Times at which the hand-arm is looked at, s.
 const MOMENTS_S: [f64; 6] = [0.0, 0.5, 1.0, 2.0, 5.0, 20.0];
-/// When the experiments are looked at, s.
+/// Times at which the experiments are looked at, s.
 const EXPERIMENT_MOMENTS_S: [f64; 3] = [0.0, 0.2, 4.0];
-/// How much of the simulation Figs. 7 and 8 show, s.
+/// Length of the simulation that Figs. 7 and 8 show, s.
 const TRANSIENT_S: f64 = 20.0;
-/// How much of the experiments Figs. 12 and 13 show, s.
+/// Length of the experiments that Figs. 12 and 13 show, s.
 const EXPERIMENT_S: f64 = 2.0;
 /// Speeds below are not told apart, rad/s.
 const SLOWEST_RAD_S: f64 = 1e-5;
@@ -25,7 +25,7 @@ pub struct Drawn {
     pub number: &'static str,
     /// The name of its files, without the ending.
     pub file: &'static str,
-    /// What it shows.
+    /// Its title.
     pub title: String,
     /// Gains, times, and what to see.
     pub caption: String,
@@ -216,7 +216,7 @@ fn until(samples: &[Sample], until_s: f64) -> &[Sample] {
     &samples[..samples.partition_point(|sample| sample.t_s <= until_s)]
 }
 
-/// How much of a run is shown, in words.
+/// Returns the part of a run that is shown, in words.
 fn span(done: &Done, samples: &[Sample]) -> String {
     let end = samples.last().map_or(0.0, |sample| sample.t_s);
     let length = done.summary().duration_s;

@@ -18,7 +18,7 @@ use std::io;
 /// Runs whose traces are written.
 const TRACES: [&str; 5] = ["hand-arm", "hand-arm-consistent", "prism", "cube", "cube-continuous"];
 
-/// Why a report can't be written.
+/// The reason for which a report can't be written.
 #[derive(Debug, thiserror::Error)]
 pub enum FilesError {
     /// A directory or a file.
@@ -32,7 +32,7 @@ pub enum FilesError {
     Draw {
         /// Its name.
         file: String,
-        /// What the drawing library said.
+        /// The error of the drawing library.
         reason: String,
     },
 }

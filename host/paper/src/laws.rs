@@ -7,7 +7,7 @@ use blindgrasp_model::file::{Control, SceneFile};
 use blindgrasp_sim::summary::Summary;
 use serde::Serialize;
 
-/// How often the law acts where it is as near to the continuous time of the theory as the tick goes, s.
+/// Period of a law that is as near to the continuous time of the theory as the tick goes, s.
 const CONTINUOUS_S: f64 = 1e-4;
 
 /// A law.
@@ -64,7 +64,7 @@ impl Case {
     pub const NORMAL_ONLY: Self = Self { law: Law::NormalOnly, gain: 0.0 };
     /// `u_s + u_st` with the gain of Table VII.
     pub const PAPER: Self = Self { law: Law::Attitudes, gain: GAINS[0] };
-    /// What is compared on many objects.
+    /// The laws that are compared on many objects.
     pub const ALL: [Self; 5] = [
         Self::NORMAL_ONLY,
         Self::PAPER,
@@ -82,12 +82,12 @@ impl Case {
     }
 }
 
-/// When and why a grasp was lost.
+/// The time and the reason of a loss.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Lost {
-    /// When, s.
+    /// The time, s.
     pub at_s: f64,
-    /// Why.
+    /// The reason.
     pub why: String,
 }
 
@@ -99,12 +99,12 @@ impl Lost {
     }
 }
 
-/// What became of a grasp under a law.
+/// The result of a grasp under a law.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Grasped {
     /// The law with its gain.
     pub case: Case,
-    /// How it was lost with the law at the scene's rate, if it was.
+    /// The loss with the law at the scene's rate, if there was one.
     pub lost: Option<Lost>,
     /// Only of one that was, and by a law that holds: how it was lost with the law at 10 kHz, if it was there too.
     pub lost_at_10_khz: Option<Lost>,

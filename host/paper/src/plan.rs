@@ -9,7 +9,7 @@ pub struct Planned {
     pub scene: &'static str,
     /// Settings `KEY=VALUE`.
     pub settings: &'static [&'static str],
-    /// What it is, and what it is for.
+    /// Its scene, and its purpose.
     pub what: &'static str,
 }
 

@@ -8,21 +8,21 @@ use serde::Serialize;
 
 const RUN: &str = "polyhedra";
 
-/// What became of the polyhedra.
+/// The results of the polyhedra.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Polyhedra {
-    /// How many were drawn.
+    /// The number that were drawn.
     pub drawn: usize,
-    /// How long each was grasped, s.
+    /// Time for which each was grasped, s.
     pub duration_s: f64,
     /// One a polyhedron for which the hand has a grasp.
     pub outcomes: Vec<Outcome>,
 }
 
-/// What became of one polyhedron.
+/// The result of one polyhedron.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Outcome {
-    /// How many faces it has.
+    /// Number of its faces.
     pub faces: usize,
     /// Its largest distance between two corners, m.
     pub extent_m: f64,
@@ -36,24 +36,24 @@ impl Outcome {
         self.grasps.iter().find(|grasped| grasped.case == case)
     }
 
-    /// Whether it was held under a law, at the rate of the experiments.
+    /// Returns `true` if it was held under a law, at the rate of the experiments.
     pub fn held(&self, case: Case) -> bool {
         self.under(case).is_some_and(Grasped::held)
     }
 }
 
 impl Polyhedra {
-    /// How many were held under a law, at the rate of the experiments.
+    /// Returns the number that were held under a law, at the rate of the experiments.
     pub fn held(&self, case: Case) -> usize {
         self.count(case, Grasped::held)
     }
 
-    /// How many were held under a law with the law at 10 kHz, or at less.
+    /// Returns the number that were held under a law with the law at 10 kHz, or at less.
     pub fn held_at_10_khz(&self, case: Case) -> usize {
         self.count(case, Grasped::held_at_10_khz)
     }
 
-    /// How many of those that were grasped, as a share of them.
+    /// Returns a number as a share of those that were grasped.
     pub fn share(&self, count: usize) -> f64 {
         count as f64 / self.outcomes.len() as f64
     }

@@ -38,10 +38,10 @@ pub struct Paper {
     pub cores: usize,
 }
 
-/// How many random polyhedra are grasped.
+/// The number of random polyhedra that are grasped.
 const POLYHEDRA: usize = 100;
 
-/// How many runs are planned, a polyhedron for one; bisection adds a few.
+/// Returns the number of runs that are planned, a polyhedron for one; bisection adds a few.
 pub fn runs() -> usize {
     PLAN.len() + sensitivity::runs(SWEEPS) + earlier::runs() + POLYHEDRA
 }
@@ -72,13 +72,13 @@ impl Paper {
         })
     }
 
-    /// How many runs there were, a polyhedron for one.
+    /// Returns the number of runs that there were, a polyhedron for one.
     pub fn runs(&self) -> usize {
         let swept = self.sweeps.iter().map(|sweep| sweep.rows.len()).sum::<usize>();
         self.evidence.runs.len() + swept + self.polyhedra.outcomes.len()
     }
 
-    /// Whether something came out worse than the documentation says.
+    /// Returns `true` if something came out worse than the documentation says.
     pub fn failed(&self) -> bool {
         self.surprises.iter().any(Surprise::is_worse)
     }
@@ -103,7 +103,7 @@ impl Paper {
     }
 }
 
-/// What a figure shows, in numbers: for each line its first, last, least and largest value.
+/// Returns the content of a figure, in numbers: for each line its first, last, least and largest value.
 fn drawn(drawn: &Drawn) -> Value {
     let data = match &drawn.drawing {
         Drawing::Strip(strip) => json!({ "times_s": strip.times_s }),

@@ -9,7 +9,7 @@ use rayon::prelude::*;
 use serde_json::{Value as Json, json};
 use std::convert::Infallible;
 
-/// How closely the point where a grasp fails is looked for, relative to the larger of the values beside it.
+/// The width to which the value at which a grasp fails is bisected, relative to the larger of the values beside it.
 pub const WIDTH: f64 = 0.1;
 
 /// A sweep to be done.
@@ -17,7 +17,7 @@ pub const WIDTH: f64 = 0.1;
 pub struct Varied {
     /// Its name.
     pub name: &'static str,
-    /// What is varied, in words.
+    /// The quantity that is varied, in words.
     pub what: &'static str,
     /// A built-in scene.
     pub scene: &'static str,
@@ -32,15 +32,15 @@ pub struct Varied {
 /// A sweep that was done.
 #[derive(Clone, Debug)]
 pub struct Sweep {
-    /// What it was to do.
+    /// The plan of the sweep.
     pub varied: Varied,
     /// The runs.
     pub plan: Plan,
-    /// What came of them.
+    /// The results of the runs.
     pub rows: Vec<Row>,
 }
 
-/// Where a grasp fails, seen from a value at which it is held: below it and above it, if it does.
+/// The values at which a grasp fails, seen from one at which it is held: below it and above it, if it does.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Limits {
     /// Towards smaller values.
@@ -120,7 +120,7 @@ impl Varied {
     }
 }
 
-/// How many runs some sweeps have, before bisection adds to them.
+/// Returns the number of runs of some sweeps, before bisection adds to them.
 pub fn runs(sweeps: &[Varied]) -> usize {
     sweeps.iter().filter_map(|varied| varied.plan().ok()).map(|plan| plan.runs()).sum()
 }
@@ -155,17 +155,18 @@ impl Sweep {
         self.plan.axes().first().map_or("", Axis::unit)
     }
 
-    /// Whether the joints have friction in all of its runs.
+    /// Returns `true` if the joints have friction in all of its runs.
     pub fn has_friction(&self) -> bool {
         self.plan.first().is_some_and(|file| file.friction.scale > 0.0)
     }
 
-    /// Where the grasp is held and where it is lost, in the order of the values.
+    /// Returns the stretches in which the grasp is held and in which it is lost, in the order of the values.
     pub fn stretches(&self) -> Vec<Stretch> {
         stretches(&self.plan, &self.rows)
     }
 
-    /// Where the grasp fails, seen from the scene's own value. `None` if it is lost there, or if two keys are varied.
+    /// Returns the values at which the grasp fails, seen from the scene's own. `None` if it is lost there, or if two
+    /// keys are varied.
     pub fn limits(&self) -> Option<Limits> {
         let (usual, stretches) = (self.varied.usual?, self.stretches());
         let here = stretches.iter().position(|s| s.held && (s.from..=s.to).contains(&usual))?;
@@ -174,13 +175,13 @@ impl Sweep {
         Some(Limits { below, above })
     }
 
-    /// What came of the run with a value of the first key, if it ran.
+    /// Returns the summary of the run with a value of the first key, if it ran.
     pub fn summary(&self, value: f64) -> Option<&Summary> {
         let has = |row: &&Row| self.plan.values(row.run).next().and_then(|value| value.number) == Some(value);
         self.rows.iter().find(has).and_then(Row::summary)
     }
 
-    /// Where the grasp is held and where it is lost, in words.
+    /// Returns the stretches in which the grasp is held and in which it is lost, in words.
     pub fn outcome(&self) -> String {
         let number = |value: f64| Value::number(value).text;
         let words = |s: &Stretch| {

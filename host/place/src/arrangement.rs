@@ -1,5 +1,5 @@
-//! Which fingertip takes which contact, and in which attitude the object is: ordered by how well the contacts lie as the
-//! fingertips of the nominal posture do.
+//! Arrangements, each a contact for every fingertip and an attitude of the object: ordered by how well the contacts lie
+//! as the fingertips of the nominal posture do.
 
 use super::candidate::Candidate;
 use super::combination::orders;

@@ -28,7 +28,7 @@ pub(super) struct Contacts {
     pub(super) centres_m: Vec<Vector3<f64>>,
 }
 
-/// Why contact points are none for a grasp.
+/// The reason for which contact points are none for a grasp.
 pub(super) enum Unfit {
     /// The law would pull a fingertip off.
     PulledOff,

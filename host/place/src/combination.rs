@@ -1,5 +1,5 @@
-//! Which faces the fingertips touch: every choice of faces, fingertips left open, rated where it is cheapest, in the middle
-//! of the faces.
+//! Combinations of faces that the fingertips touch: every choice of faces, fingertips left open, rated where it is
+//! cheapest, in the middle of the faces.
 
 use super::facet::Facet;
 use super::quality::chance;
@@ -21,18 +21,18 @@ pub(super) struct Combination {
     pub(super) chance: f64,
 }
 
-/// How many faces are looked at for so many fingertips.
+/// Returns the most faces that are looked at for so many fingertips.
 pub(super) fn most_faces(fingertips: usize) -> usize {
     let combinations = |faces: usize| (1..=fingertips).fold(1, |count, k| count * (faces + k - 1) / k);
     (1..=MOST_FACES).take_while(|&faces| combinations(faces) <= MOST_COMBINATIONS).last().unwrap_or(1)
 }
 
-/// How the combinations did.
+/// The ratings of the combinations.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Rated {
-    /// How many there were.
+    /// The number of all of them.
     pub(super) all: usize,
-    /// How many the law can't press on: it would pull a fingertip away from its face.
+    /// The number of those that the law can't press on: it would pull a fingertip away from its face.
     pub(super) pulled_off: usize,
 }
 

@@ -9,7 +9,7 @@ use nalgebra::{Vector2, Vector3};
 pub(super) struct HalfPlane {
     /// Unit vector in the axes of the face.
     pub(super) inwards: Vector2<f64>,
-    /// How far the origin lies inside, m.
+    /// Depth of the origin inside, m.
     pub(super) offset_m: f64,
 }
 
@@ -24,7 +24,7 @@ pub(super) struct Facet {
     pub(super) axes: [Vector3<f64>; 2],
     /// A point inside the face, where `z = 0`, m.
     pub(super) origin_m: Vector3<f64>,
-    /// How far the origin lies inside the outline, m.
+    /// Depth of the origin inside the outline, m.
     pub(super) margin_m: f64,
     /// A convex part of the face around the origin: all of it, if the face is convex.
     pub(super) cell: Vec<HalfPlane>,
@@ -56,7 +56,7 @@ impl Facet {
         Self { face, inward: -plane.normal, axes, origin_m, margin_m, cell: cell(&flat_edges) }
     }
 
-    /// How far a coordinate lies inside the convex part, m.
+    /// Returns the depth of a coordinate inside the convex part, m.
     pub(super) fn margin_at_m(&self, z: &Vector2<f64>) -> f64 {
         self.cell.iter().map(|half| half.inwards.dot(z) + half.offset_m).fold(f64::INFINITY, f64::min)
     }

@@ -52,21 +52,21 @@ pub use text::scene_text;
 pub const FRICTION_LIMIT: f64 = 1.0;
 /// The middle of a face has to be this far from its edges, in radii of a fingertip.
 const NARROWEST: f64 = 0.05;
-/// How much farther apart than needed fingertips are placed, in units of the distance.
+/// Distance beyond the needed one at which fingertips are placed, as a share of it.
 const SPARE: f64 = 0.03;
 
-/// What is to be placed.
+/// The request for a placement.
 #[derive(Clone, Copy, Debug)]
 pub struct Request<'a> {
     /// A scene. Faces and points of its contacts that are given stay; contacts that are empty, or missing, are found.
     pub like: &'a SceneFile,
     /// Its hand and object, prepared.
     pub parts: &'a Parts,
-    /// Where the hand's fingertips get to.
+    /// The reach of the hand's fingertips.
     pub reach: &'a Reach,
-    /// Whether the object may be anywhere, instead of where the scene says.
+    /// `true` if the object may be anywhere, instead of where the scene says.
     pub any_position: bool,
-    /// Whether it may have any attitude, instead of the scene's.
+    /// `true` if it may have any attitude, instead of the scene's.
     pub any_attitude: bool,
 }
 
@@ -75,14 +75,14 @@ pub struct Request<'a> {
 pub struct Placement {
     /// The scene.
     pub scene: Scene,
-    /// What it is worth.
+    /// Its quality.
     pub quality: Quality,
 }
 
-/// Why there is none.
+/// The reason for which there is no placement.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum NoPlacement {
-    /// What was asked for can't be.
+    /// The request can't be met.
     #[error(transparent)]
     Input(#[from] SceneError),
     /// None exists, as far as the search sees.

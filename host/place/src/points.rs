@@ -18,20 +18,20 @@ const SHARPNESS: f64 = 6.0;
 const STEPS: usize = 25;
 /// A step that changes no coordinate by more than this share of the rolling radius is the last.
 const SMALL: f64 = 1e-4;
-/// What it costs when fingertips are too close, or the law hardly presses one on: the square of what is missing, in rolling
-/// radii, times this.
+/// The price of fingertips that are too close, or that the law hardly presses on: the square of what is missing, in
+/// rolling radii, times this.
 const PRICE: f64 = 300.0;
 /// The centroid should lie this far below each fingertip along its normal, in rolling radii.
 const DEPTH: f64 = 0.3;
 
 type Square = SMatrix<f64, COORDINATES, COORDINATES>;
 
-/// What is known of the fingertips.
+/// The data of the fingertips.
 #[derive(Clone, Copy)]
 pub(super) struct Fingertips<'a> {
     /// `rho_i`, m.
     pub(super) rolling_radii_m: &'a [f64],
-    /// How far two centres have to be apart, m: by fingertip and fingertip.
+    /// Distances that two centres have to keep, m: by fingertip and fingertip.
     pub(super) apart_m: &'a [[f64; MAX_FINGERS]; MAX_FINGERS],
     /// The coordinates of contact points that are the user's, m.
     pub(super) fixed: &'a [Option<nalgebra::Vector2<f64>>],
@@ -43,7 +43,7 @@ impl Fingertips<'_> {
     }
 }
 
-/// Where the search begins: the middle of each face; fingertips that share a face stand in a row along it.
+/// Returns the start of the search: the middle of each face; fingertips that share a face stand in a row along it.
 pub(super) fn start(facets: &[&Facet], tips: Fingertips<'_>) -> Coordinates {
     let mut z = Coordinates::zeros();
     for (i, facet) in facets.iter().enumerate() {
@@ -101,7 +101,7 @@ pub(super) fn improve(
     z
 }
 
-/// What is minimised.
+/// The function that is minimised.
 struct Task<'a> {
     facets: &'a [&'a Facet],
     rolling: &'a Rolling,

@@ -1,5 +1,5 @@
-//! Where the object has to be, so that every fingertip gets to its contact: the cells of the [reach](super::reach) that all
-//! fingertips leave over, each moved back by where its contact is on the object.
+//! Positions of the object from which every fingertip gets to its contact: the cells of the [reach](super::reach) that
+//! all fingertips leave over, each moved back by where its contact is on the object.
 
 use super::reach::{CELLS, Cell, Reach};
 use blindgrasp_body::MAX_FINGERS;
@@ -8,7 +8,7 @@ use nalgebra::Vector3;
 /// A fingertip's contact in the axes of the base frame.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Target {
-    /// Where the centre of the fingertip is, from the object's centre of mass, m.
+    /// Position of the fingertip's centre from the object's centre of mass, m.
     pub(super) offset_m: Vector3<f64>,
     /// `C_Y`: into the object.
     pub(super) inward: Vector3<f64>,
@@ -45,7 +45,8 @@ pub(super) fn propose(reach: &Reach, targets: &[Target], count: usize) -> Vec<Ve
     proposals.iter().map(|cell| reach.middle_m(cell)).collect()
 }
 
-/// Whether all fingertips may get to their contacts with the object in a given position, by the map, which has holes.
+/// Returns `true` if all fingertips may get to their contacts with the object in a given position, by the map, which
+/// has holes.
 pub(super) fn near(reach: &Reach, targets: &[Target], position_m: &Vector3<f64>) -> bool {
     targets.iter().enumerate().all(|(i, target)| {
         let cell = reach.cell(&(position_m + target.offset_m));
@@ -89,8 +90,8 @@ fn for_common(reach: &Reach, targets: &[Target], mut take: impl FnMut(Cell)) {
     }
 }
 
-/// How comfortable it is to hold the object with its centre of mass in a cell: enough room before the end stops counts
-/// most, then nearness to the nominal posture. `None` where a fingertip does not get, or only with its back.
+/// Returns how comfortable it is to hold the object with its centre of mass in a cell: enough room before the end stops
+/// counts most, then nearness to the nominal posture. `None` where a fingertip does not get, or only with its back.
 fn comfort(reach: &Reach, targets: &[Target], cell: &Cell) -> Option<f64> {
     let (mut room, mut far) = (ROOM_RAD, 0.0);
     for (i, target) in targets.iter().enumerate() {

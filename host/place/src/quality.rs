@@ -1,4 +1,4 @@
-//! What a placement is worth: numbers that follow from the law's own equilibrium, and one that ranks.
+//! The quality of a placement: numbers that follow from the law's own equilibrium, and one that ranks.
 //!
 //! For every fingertip, with `A = f_d / sum(r)`, `F_i = A (x_c - x_i)` (Eq. 30) and `rho_i = r_i - dr_i`:
 //!
@@ -55,15 +55,15 @@ pub(super) fn chance(margin: f64, mean_square_turn: f64) -> f64 {
     1.0 / (1.0 + (-exponent).exp())
 }
 
-/// What ranks: the chance, less where a joint is nearer to an end stop than where that begins to push.
+/// Returns the rank: the chance, less where a joint is nearer to an end stop than where that begins to push.
 pub(super) fn score(chance: f64, room_rad: f64) -> f64 {
     chance * (room_rad / ROOM_RAD).limited(0.0, 1.0)
 }
 
-/// What a placement is worth.
+/// The quality of a placement.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Quality {
-    /// What ranks placements: the chance to hold, less where a joint is close to an end stop.
+    /// The rank of the placement: the chance to hold, less where a joint is close to an end stop.
     pub score: f64,
     /// The chance to hold for 5 s in the paper's model.
     pub chance: f64,
@@ -77,7 +77,7 @@ pub struct Quality {
     pub fingertips: Vec<FingertipQuality>,
 }
 
-/// What a contact is worth.
+/// The quality of a contact.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct FingertipQuality {
     /// Normal force of Eq. 57, N.
@@ -86,9 +86,9 @@ pub struct FingertipQuality {
     pub tangential_force_n: f64,
     /// Their ratio.
     pub friction: f64,
-    /// How far the fingertip rolls until it rests, rad.
+    /// Angle by which the fingertip rolls until it rests, rad.
     pub turn_rad: f64,
-    /// How far it moves on its face, m.
+    /// Distance by which it moves on its face, m.
     pub rolled_m: f64,
     /// Distance of the contact point from the nearest edge of its face, m.
     pub margin_m: f64,

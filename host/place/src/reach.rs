@@ -1,5 +1,5 @@
-//! Where the fingertips of a hand get to, sampled once for a hand: for every cell of a grid in the base frame, and for
-//! each fingertip, the posture nearest to the nominal one that was seen there.
+//! The reach of a hand's fingertips, sampled once for a hand: for every cell of a grid in the base frame, and for each
+//! fingertip, the posture nearest to the nominal one that was seen there.
 //!
 //! The samples are spread evenly over the ranges of the joints that move a fingertip alone, by an additive recurrence with
 //! the powers of the generalised golden ratio (M. Roberts' R sequence): the same on every machine. Joints that move several
@@ -30,7 +30,7 @@ pub(super) struct Spot {
     pub(super) bone: Vector3<f32>,
 }
 
-/// Where one fingertip gets to.
+/// The reach of one fingertip.
 #[derive(Clone, Debug)]
 struct Map {
     /// A bit a cell, a word a row along x; by `z * CELLS + y`.
@@ -40,7 +40,7 @@ struct Map {
     spots: Vec<Spot>,
 }
 
-/// Where the fingertips of a hand get to.
+/// The reach of a hand's fingertips.
 #[derive(Clone, Debug)]
 pub struct Reach {
     /// Angles that the trunk's joints keep, and that the inverse kinematics stays near, rad.
@@ -131,7 +131,7 @@ impl Reach {
         &self.maps[fingertip].rows
     }
 
-    /// What is known of a fingertip in a cell.
+    /// Returns the data of a fingertip in a cell.
     pub(super) fn spot(&self, fingertip: usize, cell: &Cell) -> Option<&Spot> {
         let map = &self.maps[fingertip];
         index(cell).and_then(|at| map.spots.get(map.at[at] as usize))
@@ -190,7 +190,7 @@ struct Sampler<'a> {
     nominal: [f64; MAX_JOINTS],
     /// The joints that move each fingertip alone.
     own: Vec<Vec<usize>>,
-    /// What each of a finger's joints adds to its fraction from sample to sample, by the number of joints.
+    /// The steps of each of a finger's joints from sample to sample, as fractions, by the number of joints.
     strides: Vec<Vec<f64>>,
 }
 

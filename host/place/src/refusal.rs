@@ -1,14 +1,14 @@
-//! Why there is no placement: how many choices failed at which test, and how near the nearest came.
+//! The reasons for which there is no placement: how many choices failed at which test, and how near the nearest came.
 
 use super::stance::Miss;
 use blindgrasp_model::HandFile;
 use serde::Serialize;
 use std::fmt;
 
-/// What became of the choices of faces, test by test.
+/// The results of the choices of faces, test by test.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Refusal {
-    /// What it comes down to, in words.
+    /// The reason, in words.
     pub reason: String,
     /// The tests in their order: what they test, how many choices of faces failed, and the nearest miss.
     pub tests: Vec<Test>,
@@ -17,9 +17,9 @@ pub struct Refusal {
 /// A test that choices of faces failed.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Test {
-    /// What went wrong, in words.
+    /// The failure, in words.
     pub what: String,
-    /// How often.
+    /// The number of failures.
     pub failed: usize,
     /// The nearest miss, in words; empty where there is no measure.
     pub nearest: String,
@@ -68,11 +68,11 @@ pub(super) struct Count {
     pub(super) choices: usize,
     /// On which the law would pull a fingertip off.
     pub(super) pulled_off: usize,
-    /// That ask for too much friction, and for how much.
+    /// Choices that ask for too much friction, and for how much.
     pub(super) slips: Tally<()>,
-    /// Whose fingertips would overlap, m.
+    /// Choices whose fingertips would overlap, m.
     pub(super) close: Tally<()>,
-    /// That lie farther apart than two fingertips get: by how much (m), the fingertips, and their distance (m).
+    /// Choices that lie farther apart than two fingertips get: by how much (m), the fingertips, and their distance (m).
     pub(super) wide: Tally<(usize, usize, f64)>,
     /// Without a position at which all fingertips get to their contacts.
     pub(super) apart: usize,
@@ -86,7 +86,7 @@ pub(super) struct Count {
     pub(super) back: Tally<Miss>,
     /// At which a bone passes through the object.
     pub(super) through: Tally<Miss>,
-    /// That the checks of a scene refuse, and why.
+    /// Choices that the checks of a scene refuse, and why.
     pub(super) refused: Tally<String>,
 }
 
@@ -145,7 +145,7 @@ impl Count {
         Refusal { reason: self.reason(words), tests }
     }
 
-    /// What it comes down to: the last test that anything came to.
+    /// Returns the reason: the last test that anything came to.
     fn reason(&self, words: &Words<'_>) -> String {
         let fingertips = words.hand.fingertips.len();
         if let Some((_, why)) = &self.refused.nearest {
@@ -198,7 +198,7 @@ fn nearest<T>(tally: &Tally<T>, words: impl Fn(f64, &T) -> String) -> String {
     tally.nearest.as_ref().map_or(String::new(), |(by, what)| words(*by, what))
 }
 
-/// What the words need to know.
+/// The data of the words.
 pub(super) struct Words<'a> {
     pub(super) hand: &'a HandFile,
     pub(super) reach: &'a super::reach::Reach,

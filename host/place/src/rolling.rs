@@ -1,4 +1,4 @@
-//! Where fingertips come to rest under the law, if they could move freely: how far they roll, by Eqs. 30 to 34.
+//! The rest of the fingertips under the law, if they could move freely: how far they roll, by Eqs. 30 to 34.
 //!
 //! Seen from the object, a fingertip that rolls on its face without slip or spin moves by `d_i` in the plane of the face and
 //! turns by `psi_i = d_i x C_Yi / rho_i` (`rho_i = r_i - dr_i`). The normal stiffness is some fifty times the pull of the law,
@@ -145,11 +145,11 @@ pub(super) struct Rolling {
     middle: Middle,
     /// Tangential pull at `z = 0`, N.
     pull_n: Coordinates,
-    /// How it changes with the coordinates, N/m.
+    /// Its slope with the coordinates, N/m.
     pull_slope_n_m: Square,
     /// By how much the fingertips roll from `z = 0`, `d_i / rho_i`, rad.
     turns_rad: Coordinates,
-    /// How that changes with the coordinates, rad/m.
+    /// Its slope with the coordinates, rad/m.
     turn_slope: Square,
     /// Curvature of the mean square turn, rad^2/m^2.
     turn_bend: Square,
@@ -176,7 +176,7 @@ impl Rolling {
         Self { middle, pull_n, pull_slope_n_m: -approach, turns_rad, turn_slope, turn_bend }
     }
 
-    /// How many fingertips there are.
+    /// Returns the number of fingertips.
     pub(super) fn count(&self) -> usize {
         self.middle.count
     }
@@ -204,8 +204,8 @@ impl Rolling {
         self.middle.gains.approach_n_m * self.middle.inwards[fingertip].dot(&away)
     }
 
-    /// How deep a fingertip's centre lies below the centroid along its normal, m (the force of Eq. 57 over `A`): the value
-    /// at `z = 0`, and its slope.
+    /// Returns the depth of a fingertip's centre below the centroid along its normal, m (the force of Eq. 57 over `A`):
+    /// the value at `z = 0`, and its slope.
     pub(super) fn depth_row(&self, fingertip: usize) -> (f64, Coordinates) {
         let inward = &self.middle.inwards[fingertip];
         let share = 1.0 / self.middle.count as f64;
@@ -225,7 +225,7 @@ impl Rolling {
         self.middle.centres_m[fingertip] + x * z[2 * fingertip] + y * z[2 * fingertip + 1]
     }
 
-    /// How the distance of two fingertips' centres along a direction grows with the coordinates.
+    /// Returns the slope of the distance of two fingertips' centres along a direction with the coordinates.
     pub(super) fn apart_slope(&self, i: usize, j: usize, along: &Vector3<f64>) -> Coordinates {
         let mut slope = Coordinates::zeros();
         for a in 0..2 {
@@ -286,7 +286,7 @@ mod tests {
         GAINS.approach_n_m / (4.0 * count as f64) * squares - GAINS.attitude_nm * traces
     }
 
-    /// Where the potential is least, by differences, is where the fingertips roll to.
+    /// The fingertips roll to where the potential is least, by differences.
     #[test]
     fn fingertips_roll_to_where_the_potential_is_least() {
         let shape = Polyhedron::regular_prism(5, 0.04, 0.05).unwrap();

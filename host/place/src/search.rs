@@ -18,7 +18,7 @@ const POSITIONS: usize = 4;
 const ROUND_M: [f64; 4] = [5e-3, 1e-3, 1e-4, 1e-6];
 /// Contact points are rounded to this, m: less than a scene takes for off the face.
 const ROUND_POINT_M: f64 = 1e-7;
-/// What rounding may cost.
+/// The share that rounding leaves.
 const LITTLE: f64 = 0.98;
 
 /// A placement that the fingers can take.
@@ -158,7 +158,7 @@ fn positions(
     }
 }
 
-/// Where everything is to be at the start of the scene.
+/// Returns the places of everything at the start of the scene.
 fn stance(
     task: &Task<'_>,
     arrangement: &Arrangement,

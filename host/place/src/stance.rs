@@ -10,7 +10,7 @@ use nalgebra::{UnitQuaternion, Vector3};
 /// Room that a fingertip needs from parts of the object beside its face, m: more than a scene asks for.
 const CLEAR_M: f64 = 1e-6;
 
-/// Where everything is to be.
+/// The places of hand and object.
 #[derive(Clone, Debug)]
 pub(super) struct Stance {
     /// Centre of mass of the object in the base frame, m.
@@ -25,7 +25,7 @@ pub(super) struct Stance {
     pub(super) centres_m: Vec<Vector3<f64>>,
 }
 
-/// Why fingers can't take a stance.
+/// The reason for which fingers can't take a stance.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Miss {
     /// A fingertip does not get there.
@@ -93,7 +93,7 @@ pub(super) fn room(hand: &Hand, angles_rad: &[f64]) -> (f64, usize) {
     .unwrap_or((f64::INFINITY, 0))
 }
 
-/// Whether a bone passes through the object: the lines between the joints, from the base on.
+/// Checks that no bone passes through the object: the lines between the joints, from the base on.
 fn through(hand: &Hand, posture: &Posture, shape: &Polyhedron, stance: &Stance) -> Result<(), Miss> {
     let to_object = |point: Vector3<f64>| stance.attitude.inverse() * (point - stance.position_m);
     for k in 0..hand.joint_count() {
@@ -111,7 +111,7 @@ fn through(hand: &Hand, posture: &Posture, shape: &Polyhedron, stance: &Stance) 
     Ok(())
 }
 
-/// Whether the line between two points, in the object frame, passes through a face.
+/// Returns `true` if the line between two points, in the object frame, passes through a face.
 fn pierces(shape: &Polyhedron, from: &Vector3<f64>, to: &Vector3<f64>) -> bool {
     shape.faces.iter().enumerate().any(|(k, face)| {
         let (before, after) =

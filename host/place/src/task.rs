@@ -13,7 +13,7 @@ use nalgebra::{UnitQuaternion, Vector2, Vector3};
 /// A point of the user's may lie this far off its face, m: it is moved onto the face.
 const OFF_FACE_M: f64 = 1e-6;
 
-/// What the user has chosen for a fingertip.
+/// The user's choice for a fingertip.
 pub(super) struct Fixed {
     pub(super) facet: Facet,
     /// The coordinates of the point, m.
@@ -23,18 +23,18 @@ pub(super) struct Fixed {
 /// A request, prepared.
 pub(super) struct Task<'a> {
     pub(super) request: &'a Request<'a>,
-    /// How many fingertips there are.
+    /// The number of fingertips.
     pub(super) count: usize,
     /// Faces that fingertips may choose, the widest first.
     pub(super) facets: Vec<Facet>,
-    /// How many faces are too narrow to be chosen, and the half-width of the widest of all, m.
+    /// The number of faces that are too narrow to be chosen, and the half-width of the widest of all, m.
     pub(super) narrow: (usize, f64),
-    /// What the user has chosen, by fingertip.
+    /// The user's choices, by fingertip.
     pub(super) fixed: Vec<Option<Fixed>>,
     pub(super) gains: Gains,
     /// `rho_i` as it will be about, m.
     pub(super) rolling_radii_m: Vec<f64>,
-    /// How far two centres have to be apart, m.
+    /// Distances that two centres have to keep, m.
     pub(super) apart_m: [[f64; MAX_FINGERS]; MAX_FINGERS],
     /// Mean of the fingertip centres of the nominal posture, m.
     pub(super) nominal_middle_m: Vector3<f64>,
@@ -107,7 +107,7 @@ impl<'a> Task<'a> {
         })
     }
 
-    /// How many fingertips may choose.
+    /// Returns the number of fingertips that may choose.
     pub(super) fn free(&self) -> usize {
         self.fixed.iter().filter(|fixed| fixed.is_none()).count()
     }
@@ -124,7 +124,7 @@ impl<'a> Task<'a> {
             .collect()
     }
 
-    /// What is known of the fingertips, with the points that the user has chosen.
+    /// Returns the points that the user has chosen, by fingertip.
     pub(super) fn fixed_points(&self) -> Vec<Option<Vector2<f64>>> {
         self.fixed.iter().map(|fixed| fixed.as_ref().and_then(|fixed| fixed.point)).collect()
     }
@@ -134,13 +134,13 @@ impl<'a> Task<'a> {
         Rolling::new(facets, &self.rolling_radii_m, self.gains)
     }
 
-    /// What the choice of points needs to know.
+    /// Returns the fingertips' data for the choice of points.
     pub(super) fn fingertips<'b>(&'b self, fixed: &'b [Option<Vector2<f64>>]) -> Fingertips<'b> {
         Fingertips { rolling_radii_m: &self.rolling_radii_m, apart_m: &self.apart_m, fixed }
     }
 }
 
-/// What the user has chosen for a fingertip, checked.
+/// Returns the user's choice for a fingertip, checked.
 fn fixed(request: &Request<'_>, fingertip: usize) -> Result<Option<Fixed>, SceneError> {
     let shape = &request.parts.object.shape;
     let Some(wish) = request.like.contacts.get(fingertip) else { return Ok(None) };

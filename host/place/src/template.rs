@@ -9,7 +9,7 @@ use blindgrasp_model::file::{
 
 /// Length of a run, s.
 const DURATION_S: f64 = 5.0;
-/// How deep the fingers of a real hand touch before they grasp, m.
+/// Depth to which the fingers of a real hand touch before they grasp, m.
 const JUST_TOUCHING_M: f64 = 1e-4;
 
 /// A scene with a hand and an object: with the gains of the hand's file, its encoders, limits and friction, and one tick of

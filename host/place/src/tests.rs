@@ -70,7 +70,7 @@ fn hull(random: &mut fastrand::Rng, size_m: f64) -> Vec<[f64; 3]> {
     (0..10).map(|_| direction().component_mul(&axes).into()).collect()
 }
 
-/// What every placement has to be.
+/// Asserts all that every placement has to be.
 fn assert_sound(placement: &Placement) {
     let scene = &placement.scene;
     let posture = blindgrasp_model::posture(&scene.hand, &scene.start.angles_rad);

@@ -55,7 +55,8 @@ impl Contact {
         }
     }
 
-    /// Where the contact is on its face: `X_i`, `Z_i` of Eqs. 7 and 8, m, from the foot of the centre of mass.
+    /// Returns the position of the contact on its face: `X_i`, `Z_i` of Eqs. 7 and 8, m, from the foot of the centre of
+    /// mass.
     pub fn foot_m(&self) -> [f64; 2] {
         [-self.frame.column(0).dot(&self.lever_m), -self.frame.column(2).dot(&self.lever_m)]
     }
@@ -70,7 +71,7 @@ impl Contact {
         self.elastic_force_n * self.indentation_m.max(0.0) / 3.0
     }
 
-    /// What the object's velocity `(dx, w)` contributes to each row; see [`Rows`].
+    /// Returns the contribution of the object's velocity `(dx, w)` to each row; see [`Rows`].
     #[inline]
     pub fn object_rows(&self) -> [[f64; 6]; 4] {
         let (cx, cy, cz) = (self.column(0), self.column(1), self.column(2));
@@ -86,7 +87,7 @@ impl Contact {
         ]
     }
 
-    /// What joint `k` of the finger contributes to each row; see [`Rows`].
+    /// Returns the contribution of joint `k` of the finger to each row; see [`Rows`].
     #[inline]
     pub fn joint_rows(&self, posture: &Posture, centre_m: &Vector3<f64>, k: usize) -> [f64; 4] {
         let pose = posture.link(k);
@@ -114,6 +115,6 @@ impl Rows {
     pub const INDENTATION: usize = 2;
     /// Torsion of the object against the fingertip, `C_Y . (w - w_i)` (Eq. 15), rad/s.
     pub const TORSION: usize = 3;
-    /// How many there are.
+    /// The number of rows.
     pub const COUNT: usize = 4;
 }

@@ -22,11 +22,11 @@ use nalgebra::Matrix3;
 
 /// Velocities of the object.
 const OBJECT: usize = 6;
-/// What fingers share: the trunk's joints, then the object.
+/// The size of the part that fingers share: the trunk's joints, then the object.
 const MAX_HEAD: usize = MAX_CHAIN + OBJECT;
 const MAX_ROWS: usize = Rows::COUNT * MAX_FINGERS;
 
-/// Which joints are whose.
+/// The joints of the trunk and of each finger.
 #[derive(Clone, Debug)]
 pub(super) struct Branches {
     /// Joints that move more than one fingertip.
@@ -87,7 +87,7 @@ impl Everything {
 #[derive(Clone, Debug)]
 pub(super) struct Coupling {
     branches: Branches,
-    /// How many fingers touch the object: the first ones.
+    /// The number of fingers that touch the object: the first ones.
     contacts: usize,
     rows: [Row; MAX_ROWS],
     /// Right-hand sides, then multipliers.

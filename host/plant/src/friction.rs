@@ -7,7 +7,7 @@
 
 use blindgrasp_body::JointFriction;
 
-/// What friction does to a joint at one instant: `-(torque + damping * speed)`, with a stiffness against displacement.
+/// The friction of a joint at one instant: `-(torque + damping * speed)`, with a stiffness against displacement.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FrictionTorque {
     /// Torque at standstill, N m.

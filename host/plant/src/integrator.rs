@@ -1,4 +1,4 @@
-//! How the plant advances in time.
+//! The plant's advance in time.
 //!
 //! Positions live at whole steps, velocities at half steps between them (leapfrog). At each whole step the velocities
 //! `v` of *that instant* are solved for together with the multipliers (`coupling.rs`), as half a step of the implicit
@@ -52,13 +52,13 @@ pub struct Plant {
     started: bool,
     /// Sub-steps since the start.
     steps: u64,
-    /// What pushes the object at this instant: force, N, and moment, N m.
+    /// The push at this instant: force, N, and moment, N m.
     pushed: [f64; 6],
     posture: Posture,
     bodies: [Body; MAX_JOINTS],
     mass: JointMatrix,
     contacts: Vec<Contact>,
-    /// What each fingertip may run into.
+    /// The surroundings of each fingertip, which it may run into.
     surroundings: Vec<Surroundings>,
     forces: Vec<ContactForce>,
     coupling: Coupling,
@@ -177,7 +177,8 @@ impl Plant {
         energy_j
     }
 
-    /// What has flowed in and out of the plant's energy from the start to this instant, after [`Self::solve`]: work, J.
+    /// Returns the flows in and out of the plant's energy from the start to this instant, after [`Self::solve`]: work,
+    /// J.
     pub fn flows(&self) -> Flows {
         if self.started { self.work.after(&self.power, 0.5 * self.substep_s) } else { Flows::NONE }
     }
@@ -285,7 +286,8 @@ impl Plant {
         self.place();
     }
 
-    /// What pushes the object, on average over the half steps around this instant: what the step's kick stands for.
+    /// Returns the pushes at the object, on average over the half steps around this instant: what the step's kick
+    /// stands for.
     fn pushes(&self) -> [f64; 6] {
         let mut sum = [0.0; 6];
         let (t_s, half_s) = (self.steps as f64 * self.substep_s, 0.5 * self.substep_s);
@@ -314,7 +316,7 @@ impl Plant {
         }
     }
 
-    /// Whether the assumptions that the model stands on still hold.
+    /// Checks that the assumptions which the model stands on still hold.
     fn watch(&mut self) -> Result<(), Lost> {
         let shape = &self.model.object.shape;
         for (finger, (contact, face)) in self.contacts.iter().zip(&self.model.faces).enumerate() {
@@ -389,7 +391,7 @@ impl Plant {
         Pressed { scale, rate_m_s: rate }
     }
 
-    /// What flows at this instant, with the velocities that were solved for.
+    /// Returns the powers at this instant, with the velocities that were solved for.
     fn powers(&self, torques_nm: &JointVector, tau: f64, pressed: &[Pressed; MAX_FINGERS]) -> Flows {
         let mut flows = Flows::NONE;
         let speeds = self.solution.joints.iter().zip(&self.before.joints);

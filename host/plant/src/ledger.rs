@@ -1,4 +1,5 @@
-//! What flows in and out of the plant's energy: the work of the motors and of pushes, and what dampers and friction take.
+//! The flows in and out of the plant's energy: the work of the motors and of pushes, and what dampers and friction
+//! take.
 //!
 //! The flows of an instant are powers with the velocities and forces that the integrator solves for there; they are summed
 //! by the trapezoidal rule over whole steps, which is the rule by which the integrator itself adds up forces: what a force
@@ -43,7 +44,7 @@ impl Flows {
         spin_squared: 0.0,
     };
 
-    /// What everything that dampens took.
+    /// Returns the energy that all dampers and friction took.
     pub fn dissipated(&self) -> f64 {
         self.indentation + self.torsion + self.friction
     }

@@ -1,4 +1,4 @@
-//! What is simulated: the model that does not change, and the motion that does.
+//! The simulated world: the model that does not change, and the motion that does.
 
 use blindgrasp_body::dynamics::JointVector;
 use blindgrasp_body::polyhedron::Polyhedron;
@@ -33,11 +33,11 @@ pub struct PlantModel {
     pub hand_gravity_m_s2: Vector3<f64>,
     /// Gravity on the object, m/s^2; the paper neglects it (assumption 5).
     pub object_gravity_m_s2: Vector3<f64>,
-    /// What pushes the object from outside.
+    /// The pushes at the object from outside.
     pub pushes: Vec<Push>,
 }
 
-/// Where everything is and how it moves at one instant.
+/// The positions and velocities of everything at one instant.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Motion {
     /// Joint angles `q`, rad.
@@ -68,7 +68,7 @@ impl Motion {
     }
 }
 
-/// Why a grasp ended: one of the paper's assumptions no longer holds.
+/// The reason for which a grasp ended: one of the paper's assumptions no longer holds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum Lost {
     /// A fingertip left its face (assumption 2).
@@ -97,13 +97,13 @@ pub enum Lost {
     Diverged,
 }
 
-/// Why a model can't be simulated.
+/// The reason for which a model can't be simulated.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum ModelError {
     /// A finger or the trunk has too many joints.
     #[error("a finger (or the trunk) has {joints} joints: at most {MAX_CHAIN} are supported")]
     ChainTooLong {
-        /// How many it has.
+        /// The number of its joints.
         joints: usize,
     },
     /// The mass matrix of the hand or of the object is not positive definite in the initial posture.

@@ -1,4 +1,4 @@
-//! What pushes the object from outside: a force and a moment that rise, stay, and fall.
+//! Pushes at the object from outside: a force and a moment that rise, stay, and fall.
 
 use blindgrasp_body::Push;
 

@@ -1,4 +1,4 @@
-//! Whether a fingertip that rolls on a face comes to another part of the object.
+//! The surroundings of a fingertip that rolls on a face, and may come to another part of the object.
 
 use blindgrasp_body::FaceContact;
 use blindgrasp_body::polyhedron::{Obstacles, Polyhedron};
@@ -9,9 +9,9 @@ use nalgebra::Vector3;
 #[derive(Clone, Debug)]
 pub(super) struct Surroundings {
     obstacles: Obstacles,
-    /// Where the fingertip's centre was at the last look, object frame, m.
+    /// Position of the fingertip's centre at the last look, object frame, m.
     looked_from_m: Vector3<f64>,
-    /// How far it could move from there, m.
+    /// Distance that it could move from there, m.
     room_m: f64,
 }
 
@@ -21,7 +21,7 @@ impl Surroundings {
         Self { obstacles: Obstacles::above(shape, face.face), looked_from_m: Vector3::zeros(), room_m: 0.0 }
     }
 
-    /// Whether a sphere (object frame) has come to any of it.
+    /// Returns `true` if a sphere (object frame) has come to any of it.
     pub(super) fn reach(&mut self, centre_m: &Vector3<f64>, radius_m: f64) -> bool {
         let moved_squared = (centre_m - self.looked_from_m).norm_squared();
         if self.obstacles.is_empty() || (self.room_m > 0.0 && moved_squared < self.room_m * self.room_m) {

@@ -14,10 +14,10 @@ const EDGE: i32 = 8;
 /// A linear axis.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Ruler {
-    /// What it shows, with its unit.
+    /// Its title, with its unit.
     pub(super) words: String,
     pub(super) range: Range<f64>,
-    /// Where it has ticks, and their labels.
+    /// The places of its ticks, with their labels.
     pub(super) ticks: Vec<(f64, String)>,
 }
 
@@ -44,7 +44,7 @@ pub(super) struct Frame {
     pub(super) labels: i32,
 }
 
-/// What a chart of these axes is drawn on.
+/// A chart of these axes.
 pub(super) type Chart<'a, B> = ChartContext<'a, B, Cartesian2d<Ticked, Ticked>>;
 
 impl Frame {

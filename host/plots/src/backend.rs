@@ -19,7 +19,7 @@ fn parts(colour: BackendColor) -> (Rgb, f32) {
     ([colour.rgb.0, colour.rgb.1, colour.rgb.2], colour.alpha as f32)
 }
 
-/// What Plotters needs; the rest of its trait has default methods that end in `draw_pixel`.
+/// The methods that Plotters needs; the rest of its trait has default methods that end in `draw_pixel`.
 impl DrawingBackend for Pen<'_> {
     type ErrorType = Infallible;
 

@@ -1,4 +1,5 @@
-//! What every figure that Plotters draws has in common: a bitmap and an SVG file of the same picture, and its title.
+//! The part that all figures which Plotters draws have in common: a bitmap and an SVG file of the same picture, and its
+//! title.
 
 use super::backend::Pen;
 use super::pens::{letters, reason, register_font};

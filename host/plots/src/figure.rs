@@ -25,7 +25,7 @@ impl Line {
     }
 }
 
-/// How values are laid out along the vertical axis.
+/// The vertical axis.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Axis {
     /// Over this range, in the panel's unit.
@@ -46,14 +46,14 @@ impl Axis {
     }
 }
 
-/// What runs along the horizontal axis of a figure.
+/// The horizontal axis.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Along {
     /// Time, in seconds from the start.
     Times(Vec<f64>),
     /// Numbers above zero, over their powers of ten.
     Decades {
-        /// What they are, with the unit.
+        /// The title, with the unit.
         words: &'static str,
         /// The numbers, from small to large.
         values: Vec<f64>,
@@ -83,7 +83,7 @@ impl Along {
 pub struct Panel {
     /// Over the legend.
     pub heading: String,
-    /// What is drawn: the axis label without the unit.
+    /// The quantity that is drawn: the axis label without the unit.
     pub quantity: &'static str,
     /// SI unit without prefix; empty for a pure number.
     pub unit: &'static str,
@@ -98,7 +98,7 @@ pub struct Panel {
 pub struct Figure {
     /// Over it all.
     pub title: String,
-    /// Where the values are.
+    /// The horizontal axis.
     pub along: Along,
     /// From the top.
     pub panels: Vec<Panel>,

@@ -11,7 +11,7 @@ const LINE_WIDTH: f64 = 1.6;
 /// Size of all text but the title.
 pub(super) const LABEL_SIZE: i32 = 15;
 
-/// How a line is broken: pixels drawn and pixels left out.
+/// The dashes of a line: pixels drawn and pixels left out.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Dash {
     /// Not broken.

@@ -1,4 +1,4 @@
-//! What the figures show: joint velocities, object velocities, contact forces, residuals.
+//! The figures of a run: joint velocities, object velocities, contact forces, residuals.
 
 use super::figure::{Along, Axis, Figure, Line, Panel};
 use super::pens::Dash;

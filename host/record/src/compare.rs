@@ -1,4 +1,4 @@
-//! What two devices that were told the same did, bit for bit.
+//! Two devices that were told the same, compared bit for bit.
 
 use blindgrasp_shared::signals::Value as Told;
 use blindgrasp_wire::{Answer, Record, Turned};
@@ -10,13 +10,13 @@ use std::fmt;
 pub struct Difference {
     /// Number of the tick; the grasp began at 0.
     pub tick: i64,
-    /// What differed.
+    /// The signal that differed.
     pub what: &'static str,
-    /// Whose it is.
+    /// The joint that it is of.
     pub joint: Option<String>,
-    /// What the firmware says.
+    /// The firmware's value.
     pub device: Value,
-    /// What the host says.
+    /// The host's value.
     pub host: Value,
 }
 
@@ -148,13 +148,13 @@ impl Comparison {
     }
 }
 
-/// Whether two records are the same, where a float is its bits: on the wire it is nothing else.
+/// Returns `true` if two records are the same, where a float is its bits: on the wire it is nothing else.
 fn same_bits(a: &Record, b: &Record) -> bool {
     let [mut first, mut second] = [[0; Record::MOST_BYTES]; 2];
     a.encode(&mut first).ok().as_deref() == b.encode(&mut second).ok().as_deref()
 }
 
-/// Who each is, is not compared, only in which session they are.
+/// The identities are not compared, only the sessions.
 fn same_answer(a: Option<&Answer>, b: Option<&Answer>) -> bool {
     match (a, b) {
         (Some(Answer::Value(a)), Some(Answer::Value(b))) => a.value.to_bits() == b.value.to_bits(),

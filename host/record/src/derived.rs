@@ -30,7 +30,7 @@ macro_rules! derived {
                 match self { $(Self::$name => $words,)* }
             }
 
-            /// What there is one of.
+            /// Returns the thing that has a value of its own.
             pub const fn each(self) -> Each {
                 match self { $(Self::$name => Each::$each,)* }
             }

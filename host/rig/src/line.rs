@@ -1,6 +1,6 @@
-//! What is between the tick and the line in the firmware (`firmware/src/queue.rs`, `link.rs`), for a hand that is simulated:
-//! the same queues with the same room, in the same order, and a line of the same speed. So what a real line has no time for
-//! is dropped here, too, and counted in the same place.
+//! The part between the tick and the line in the firmware (`firmware/src/queue.rs`, `link.rs`), for a hand that is
+//! simulated: the same queues with the same room, in the same order, and a line of the same speed. So what a real line
+//! has no time for is dropped here, too, and counted in the same place.
 
 use blindgrasp_body::MAX_JOINTS;
 use blindgrasp_shared::command::{Command, Refusal};
@@ -36,7 +36,7 @@ pub struct Line {
     bytes_per_s: f64,
     /// Bytes that the line has had time for, and was not given yet.
     credit_bytes: f64,
-    /// What is being sent, and how much of it was.
+    /// The frame that is being sent, and how much of it was.
     frame: Vec<u8>,
     sent: usize,
 }
@@ -59,7 +59,7 @@ impl Line {
         }
     }
 
-    /// Whether there is room for the refusal of whatever may come. Where not, bytes wait where they are.
+    /// Returns `true` if there is room for the refusal of whatever may come. Where not, bytes wait where they are.
     pub fn listens(&self) -> bool {
         self.refusals.len() < REFUSALS
     }
@@ -114,7 +114,7 @@ impl Line {
         self.records.len()
     }
 
-    /// How much was dropped so far.
+    /// Returns the number of records that were dropped so far.
     pub fn dropped(&self) -> u32 {
         self.dropped
     }

@@ -29,7 +29,7 @@ use blindgrasp_wire::{Answer, Firmware, Packet, Request, Sample, Turned, in_word
 /// Heartbeats in the time that the firmware can do without one.
 const HEARTBEATS: u32 = 3;
 
-/// Why a run with a firmware can't begin, or go on.
+/// The reason for which a run with a firmware can't begin, or go on.
 #[derive(Debug, thiserror::Error)]
 pub enum PilError {
     /// The link.
@@ -59,7 +59,7 @@ pub enum PilError {
         "the firmware is for another hand than the scene, which needs `{hand}` ({hand_hash:08x}); it is {firmware}. Build it with HAND=FILE (a path from the root of the repository), the file of the scene's hand"
     )]
     OtherHand {
-        /// What it is.
+        /// The firmware's description.
         firmware: String,
         /// The scene's hand.
         hand: String,
@@ -79,35 +79,35 @@ pub enum PilError {
     Switched {
         /// One of its parameters.
         parameter: Parameter,
-        /// Whether it is on in the scene.
+        /// `true` if it is on in the scene.
         scene: bool,
     },
     /// It refuses a parameter of the scene.
     #[error("the firmware refuses the scene's `{parameter}` [{index}] = {value}: {}", .refusal.words())]
     ParameterRefused {
-        /// Which.
+        /// The parameter.
         parameter: Parameter,
         /// Of which joint or axis.
         index: u8,
-        /// What it was to be.
+        /// The value that it was to have.
         value: f32,
-        /// Why not.
+        /// The refusal.
         refusal: Refusal,
     },
     /// It refuses something.
     #[error("the firmware refuses {request}: {}", .refusal.words())]
     Refused {
-        /// What was asked for.
+        /// The request.
         request: String,
-        /// Why not.
+        /// The refusal.
         refusal: Refusal,
     },
     /// It answers something else than what it was asked for.
     #[error("the firmware answers {request} with {answer}")]
     OddAnswer {
-        /// What was asked for.
+        /// The request.
         request: String,
-        /// What it said.
+        /// The answer.
         answer: String,
     },
 }
@@ -116,12 +116,12 @@ fn on(on: bool) -> &'static str {
     if on { "on" } else { "off" }
 }
 
-/// What a scene wants of a firmware, checked.
+/// The demands of a scene on a firmware, checked.
 #[derive(Clone, Debug)]
 pub struct Plan {
     /// The scene's hand, with the configuration that its firmware starts with.
     pub hand: HandModel,
-    /// What the firmware is to have before it arms.
+    /// The parameters that the firmware is to have before it arms.
     params: Params<MAX_JOINTS, MAX_FINGERS>,
 }
 
@@ -193,17 +193,17 @@ impl<T: Transport> Linked<T> {
         Ok(Self { client, hand, firmware: None, twin: None, comparison, grasped_at: None })
     }
 
-    /// What differed so far.
+    /// Returns the comparison so far.
     pub fn comparison(&self) -> &Comparison {
         &self.comparison
     }
 
-    /// What went over the line so far.
+    /// Returns the traffic on the line so far.
     pub fn traffic(&self) -> &Traffic {
         self.client.traffic()
     }
 
-    /// Who is at the other end, once it was asked.
+    /// Returns the firmware at the other end, once it was asked.
     pub fn firmware(&self) -> Option<&Firmware> {
         self.firmware.as_ref()
     }
@@ -253,7 +253,7 @@ impl<T: Transport> Peer for Linked<T> {
 pub struct Pilot<P> {
     peer: P,
     joint_count: usize,
-    /// What the scene wants.
+    /// The parameters of the scene.
     params: Params<MAX_JOINTS, MAX_FINGERS>,
     session: u16,
     sequence: u16,
@@ -400,7 +400,7 @@ impl<P: Peer> Pilot<P> {
         Ok(())
     }
 
-    /// What is to be said in a tick.
+    /// Returns the request that is to be made in a tick.
     fn request(&self, turn: &Turn<'_>) -> Option<Request> {
         match (turn.reach, turn.command) {
             (Reach::Nothing, _) => None,

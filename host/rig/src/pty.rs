@@ -14,7 +14,7 @@ use std::path::{Path, PathBuf};
 pub struct Pty {
     end: File,
     port: PathBuf,
-    /// Whether a program has opened the port, as far as is known.
+    /// `true` if a program has opened the port, as far as is known.
     attended: bool,
     lost_bytes: u64,
 }
@@ -35,12 +35,12 @@ impl Pty {
         Ok(Self { end: File::from(pair.master), port, attended: false, lost_bytes: 0 })
     }
 
-    /// What a program opens.
+    /// Returns the path that a program opens.
     pub fn port(&self) -> &Path {
         &self.port
     }
 
-    /// What came; nothing if nobody is there.
+    /// Receives the bytes that came; nothing if nobody is there.
     ///
     /// # Errors
     /// If the operating system refuses.
@@ -73,18 +73,18 @@ impl Pty {
         Ok(())
     }
 
-    /// How many bytes were lost because a program did not read.
+    /// Returns the number of bytes that were lost because a program did not read.
     pub fn lost_bytes(&self) -> u64 {
         self.lost_bytes
     }
 }
 
-/// Whether no program has opened the port.
+/// Returns `true` if no program has opened the port.
 fn is_nobody(error: &io::Error) -> bool {
     error.raw_os_error() == Some(Errno::EIO as i32)
 }
 
-/// Whether there is nothing now.
+/// Returns `true` if there is nothing now.
 fn is_nothing(error: &io::Error) -> bool {
     matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::Interrupted)
 }

@@ -8,7 +8,7 @@ use std::io;
 use std::thread;
 use std::time::{Duration, Instant};
 
-/// What was done.
+/// The totals of what was served.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Served {
     /// Ticks.
@@ -23,20 +23,21 @@ pub struct Served {
     pub lost_bytes: u64,
 }
 
-/// How far the ticks may be behind before what is missing is given up. Ticks that are made up for run without a heartbeat
-/// between them, of which a hand wants one in 250 ms, and gets one in 83 at the latest: so many more are no trouble.
+/// Longest delay of the ticks before those that are missing are given up. Ticks that are made up for run without a
+/// heartbeat between them, of which a hand wants one in 250 ms, and gets one in 83 at the latest: so many more are no
+/// trouble.
 const MOST_BEHIND: Duration = Duration::from_millis(50);
 
-/// When ticks are done: each at its time, or as soon after it as the host has the time. A host that stood still for longer
-/// does not make up for what it has missed.
+/// The times at which ticks are done: each at its time, or as soon after it as the host has the time. A host that stood
+/// still for longer does not make up for what it has missed.
 #[derive(Clone, Debug)]
 pub struct Pace {
     period: Duration,
-    /// When the next tick is due.
+    /// The time at which the next tick is due.
     due: Duration,
 }
 
-/// What there is to do at a time.
+/// The next thing to do.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Step {
     /// Nothing, for so long.
@@ -56,7 +57,7 @@ impl Pace {
         Self { period, due: now }
     }
 
-    /// What there is to do now. A tick counts as done.
+    /// Returns what there is to do now. A tick counts as done.
     pub fn step(&mut self, now: Duration) -> Step {
         if now < self.due {
             return Step::Wait(self.due - now);
@@ -71,7 +72,7 @@ impl Pace {
     }
 }
 
-/// What there is to tell of a tick.
+/// News of a tick.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum News {
     /// Something happened in the world.

@@ -24,12 +24,12 @@ use blindgrasp_sim::encoders::Encoders;
 use blindgrasp_sim::motors::Motors;
 use blindgrasp_wire::Packet;
 
-/// How long putting the object back takes, s.
+/// Time that putting the object back takes, s.
 const PUT_BACK_S: f64 = 1.0;
-/// How long an encoder fails, s.
+/// Time for which an encoder fails, s.
 const FAILURE_S: f64 = 0.1;
 
-/// Why a scene can't be a hand.
+/// The reason for which a scene can't be a hand.
 #[derive(Debug, thiserror::Error)]
 pub enum SimulatedError {
     /// No firmware can do what it wants.
@@ -40,7 +40,7 @@ pub enum SimulatedError {
     Model(#[from] ModelError),
 }
 
-/// What happened in the world, in a tick.
+/// An event in the world, in a tick.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Happening {
     /// A grasp began.
@@ -53,20 +53,20 @@ pub enum Happening {
     PutBack,
 }
 
-/// What the tick gets besides the joints.
+/// Inputs of the tick besides the joints.
 #[derive(Clone, Debug, Default)]
 pub struct Turn {
     /// A request.
     pub packet: Option<Packet>,
-    /// Whether the tick before was late.
+    /// `true` if the tick before was late.
     pub late: bool,
-    /// What was dropped since the start.
+    /// The number of messages that were dropped since the start.
     pub dropped: u32,
     /// Records and parts of snapshots that wait for the line.
     pub waiting: usize,
 }
 
-/// Where the world is.
+/// The state of the world.
 #[derive(Clone, Debug)]
 enum World {
     /// At the start.
@@ -77,7 +77,7 @@ enum World {
     PutBack { from_rad: JointVector, ticks: u64 },
 }
 
-/// What is held.
+/// The object that is held.
 #[derive(Clone, Debug)]
 struct Held {
     plant: Plant,
@@ -98,10 +98,10 @@ pub struct SimulatedHand {
     motors: Motors,
     delay: Delay,
     world: World,
-    /// Whether the next grasp is a new one.
+    /// `true` if the next grasp is a new one.
     ready: bool,
     period_s: f64,
-    /// When an encoder fails, ticks after each grasp.
+    /// The time at which an encoder fails, ticks after each grasp.
     failure: Option<u64>,
 }
 
@@ -187,7 +187,7 @@ impl SimulatedHand {
         Reading::Counts(self.encoders.read(&angles_rad))
     }
 
-    /// What the torques do until the next tick.
+    /// Moves the world on under these torques until the next tick.
     fn move_on(&mut self, mode: Mode, wanted_nm: &[f32; MAX_JOINTS]) -> Option<Happening> {
         let put_back = self.ticks(PUT_BACK_S);
         let grasps = matches!(mode, Mode::Grasping | Mode::Releasing);

@@ -72,7 +72,7 @@ impl Twin {
         Turned { answer, record: outputs.record }
     }
 
-    /// What its tick remembers.
+    /// Returns the state of its tick.
     pub fn state(&self) -> &State<MAX_JOINTS, MAX_FINGERS> {
         self.device.state()
     }

@@ -1,4 +1,5 @@
-//! What stands between the sensors and the motors of a simulated hand, and the simplest that can: the tick alone.
+//! A controller, which stands between the sensors and the motors of a simulated hand, and the simplest one: the tick
+//! alone.
 
 use blindgrasp_body::{MAX_FINGERS, MAX_JOINTS};
 use blindgrasp_model::Scene;
@@ -13,7 +14,7 @@ use std::convert::Infallible;
 
 /// A controller of the hand, a tick at a time.
 pub trait Controller {
-    /// Why it may be unable to do a tick.
+    /// The error of a tick that can't be done.
     type Error;
 
     /// One tick.
@@ -23,20 +24,20 @@ pub trait Controller {
     fn step(&mut self, turn: &Turn<'_>) -> Result<Stepped, Self::Error>;
 }
 
-/// What a tick gets.
+/// The inputs of a tick.
 #[derive(Clone, Copy, Debug)]
 pub struct Turn<'a> {
-    /// What is known of the joints; zero beyond the hand's.
+    /// The state of the joints; zero beyond the hand's.
     pub sensed: Sensed<'a, MAX_JOINTS>,
-    /// Whether the tick before is to count as late.
+    /// `true` if the tick before is to count as late.
     pub late: bool,
-    /// What the user asks for.
+    /// The command of the user.
     pub command: Option<Command>,
-    /// What of the host reaches the hand.
+    /// The reach of the host.
     pub reach: Reach,
 }
 
-/// What of the host reaches the hand.
+/// The part of the host that reaches the hand.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Reach {
     /// Commands and heartbeats.
@@ -47,7 +48,7 @@ pub enum Reach {
     Nothing,
 }
 
-/// What a tick gives.
+/// The outputs of a tick.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Stepped {
     /// Torques of the next tick, N m; zero beyond the hand's joints.
@@ -87,12 +88,12 @@ impl Alone {
         &self.params
     }
 
-    /// What it remembers after its last tick.
+    /// Returns the state after its last tick.
     pub fn state(&self) -> &State<MAX_JOINTS, MAX_FINGERS> {
         &self.state
     }
 
-    /// What its last tick did; `None` before the first.
+    /// Returns the record of its last tick; `None` before the first.
     pub fn record(&self) -> Option<&Record<MAX_JOINTS>> {
         self.record.as_ref()
     }

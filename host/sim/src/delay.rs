@@ -33,7 +33,7 @@ mod tests {
     use crate::controller::Alone;
     use blindgrasp_model::Scene;
 
-    /// What is on the joints is what the controller wanted so many ticks before, or when it was armed.
+    /// The torques on the joints are those that the controller wanted so many ticks before, or when it was armed.
     #[test]
     fn a_run_applies_what_was_wanted_before() {
         for ticks in [0, 1, 5] {

@@ -1,4 +1,4 @@
-//! What can be made to go wrong in a run, between the plant and the controller.
+//! Faults that can be injected into a run, between the plant and the controller.
 
 use super::controller::Reach;
 use blindgrasp_body::MAX_JOINTS;
@@ -9,21 +9,21 @@ use blindgrasp_shared::fault::Raised;
 pub struct Injection {
     /// Number of the tick; the grasp begins at 0.
     pub at_tick: u64,
-    /// What goes wrong.
+    /// The fault.
     pub kind: Kind,
 }
 
-/// What goes wrong.
+/// A fault.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Kind {
     /// A counter keeps its count from then on.
     CounterFrozen {
-        /// Which joint's.
+        /// The joint.
         joint: usize,
     },
     /// A counter is off from then on.
     CounterJump {
-        /// Which joint's.
+        /// The joint.
         joint: usize,
         /// By so much.
         counts: i32,
@@ -49,7 +49,7 @@ impl Kind {
     }
 }
 
-/// What the controller gets of the hand in a tick.
+/// The sensing of the hand in a tick, as the controller gets it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Sensing {
     pub(super) counts: [i32; MAX_JOINTS],
@@ -62,7 +62,7 @@ pub(super) struct Sensing {
 #[derive(Clone, Debug, Default)]
 pub(super) struct Injections {
     list: Vec<Injection>,
-    /// What each frozen counter shows.
+    /// The count of each frozen counter.
     frozen: [Option<i32>; MAX_JOINTS],
 }
 

@@ -45,7 +45,7 @@ use std::num::NonZeroU64;
 use std::time::Instant;
 use summary::{Ending, Summary, Tally};
 
-/// Why a scene can't be simulated.
+/// The reason for which a scene can't be simulated.
 #[derive(Debug, thiserror::Error)]
 pub enum SimulationError {
     /// The plant has no equations of motion.
@@ -269,7 +269,7 @@ impl<C: Controller> Simulation<C> {
         self.controller.step(&Turn { sensed, late: sensing.late, command, reach: sensing.reach })
     }
 
-    /// What the torques do in one control period.
+    /// Moves the plant on under the torques of one control period.
     fn move_on(
         &mut self,
         tick: u64,

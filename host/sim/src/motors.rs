@@ -11,7 +11,7 @@ pub struct Motors {
     torque_limits_nm: JointVector,
     /// Steps of the plant in a period.
     pub(crate) substeps: usize,
-    /// What was on the joints in the period before, if there was one, N m.
+    /// The torques on the joints in the period before, if there was one, N m.
     applied_nm: Option<JointVector>,
 }
 

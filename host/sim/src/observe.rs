@@ -1,5 +1,5 @@
-//! What the closed loop's theory says about one instant: the residuals of Eq. 38, the desired normal force of Eq. 57, the
-//! energy of Eq. 40.
+//! The closed loop's theory at one instant: the residuals of Eq. 38, the desired normal force of Eq. 57, the energy of
+//! Eq. 40.
 //!
 //! Departure from the print: the elastic part of the energy is `sum(P_i)` of Eq. 18, not the `dP` of Eq. 46. What Eq. 46
 //! takes away, a constant force times the indentation, changes as the fingertips roll, so that with it Eq. 39 would not
@@ -19,7 +19,7 @@ pub struct Observer {
     latch: Latch<f64, MAX_JOINTS, MAX_FINGERS>,
 }
 
-/// What the controller says about the tick that is observed.
+/// The controller's account of the tick that is observed.
 #[derive(Clone, Copy, Debug)]
 pub struct Seen<'a> {
     /// Estimated joint angles, rad.

@@ -4,7 +4,7 @@ use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 use std::{fs, fs::File};
 
-/// Why a run can't be written.
+/// The reason for which a run can't be written.
 #[derive(Debug, thiserror::Error)]
 pub enum RunDirError {
     /// The directory has files in it.
@@ -18,7 +18,7 @@ pub enum RunDirError {
     Io {
         /// The file or directory.
         path: PathBuf,
-        /// What it said.
+        /// The cause.
         source: io::Error,
     },
 }

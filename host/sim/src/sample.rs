@@ -71,7 +71,7 @@ pub struct EnergySample {
     pub motors_j: f64,
     /// Work of what pushes the object from outside, J.
     pub pushes_j: f64,
-    /// What the damping `C` of the law takes of it, the integral of `dq^T C dq`, J.
+    /// The part of it that the damping `C` of the law takes, the integral of `dq^T C dq`, J.
     pub damping_j: f64,
     /// Taken by the dampers of the normal forces, `xi (d(dr)/dt)^2`, J.
     pub indentation_j: f64,
@@ -93,12 +93,13 @@ impl EnergySample {
         self.potentials_j.iter().fold(self.kinetic_j + self.elastic_j, |sum, potential_j| sum + potential_j)
     }
 
-    /// What the plant stores, J: without the law's potentials, which are the motors' to give.
+    /// Returns the energy that the plant stores, J: without the law's potentials, which are the motors' to give.
     pub fn stored_j(&self) -> f64 {
         self.kinetic_j + self.elastic_j + self.weight_j
     }
 
-    /// What dampers and friction have taken, J; without the law's damping, which is the motors' work.
+    /// Returns the energy that dampers and friction have taken, J; without the law's damping, which is the motors'
+    /// work.
     pub fn dissipated_j(&self) -> f64 {
         self.indentation_j + self.torsion_j + self.friction_j
     }
@@ -121,7 +122,8 @@ pub struct ContactSample {
     pub point_m: Vector3<f64>,
     /// Contact frame `(C_X, C_Y, C_Z)`, columns; `C_Y` points into the object.
     pub frame: nalgebra::Matrix3<f64>,
-    /// Where the contact is on its face: coordinates along `C_X` and `C_Z` from the foot of the centre of mass, m.
+    /// The position of the contact on its face: coordinates along `C_X` and `C_Z` from the foot of the centre of mass,
+    /// m.
     pub foot_m: [f64; 2],
     /// Residual force `Delta lambda_i1` of Eq. 38 in the contact frame, N.
     pub force_residual_n: Vector3<f64>,

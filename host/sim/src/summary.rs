@@ -18,15 +18,16 @@ pub struct Summary {
     pub scene: String,
     /// Simulated time, s.
     pub duration_s: f64,
-    /// Whether everything was at rest from some time on: all `|dq| < 1e-3 rad/s`, `|dx| < 1e-4 m/s`, `|w| < 1e-3 rad/s`.
+    /// `true` if everything was at rest from some time on: all `|dq| < 1e-3 rad/s`, `|dx| < 1e-4 m/s`, `|w| < 1e-3
+    /// rad/s`.
     pub settled: bool,
     /// The time from which on it was, s.
     pub settle_time_s: Option<f64>,
-    /// Whether every fingertip stayed on its face to the end.
+    /// `true` if every fingertip stayed on its face to the end.
     pub grasp_held: bool,
-    /// When the grasp was lost, s.
+    /// Time at which the grasp was lost, s.
     pub lost_at_s: Option<f64>,
-    /// Why, in words.
+    /// The reason, in words.
     pub lost_reason: Option<String>,
     /// The fault that the controller ended in, in words.
     pub fault: Option<String>,
@@ -77,14 +78,14 @@ pub struct Energy {
     pub increase_max_j: f64,
 }
 
-/// How a run ended.
+/// The end of a run.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Ending {
     /// Name of the scene.
     pub scene: String,
     /// Simulated time, s.
     pub duration_s: f64,
-    /// When and why the grasp was lost, if it was.
+    /// The time and the reason of the loss, if there was one.
     pub lost: Option<(f64, Lost)>,
     /// The fault that the controller ended in, in words.
     pub fault: Option<String>,
@@ -154,7 +155,7 @@ impl Last {
     }
 }
 
-/// Whether everything is at rest, within the limits that [`Summary::settled`] names.
+/// Returns `true` if everything is at rest, within the limits that [`Summary::settled`] names.
 pub fn at_rest(sample: &Sample) -> bool {
     fastest_joint(sample) < REST_JOINT_SPEED_RAD_S
         && sample.velocity_m_s.norm() < REST_OBJECT_SPEED_M_S

@@ -22,13 +22,13 @@ use std::sync::mpsc::{self, Receiver, TryRecvError};
 use std::thread;
 use std::time::{Duration, Instant};
 
-/// How long nothing is looked at but the line.
+/// Longest time for which nothing is looked at but the line.
 const SLICE: Duration = Duration::from_millis(10);
-/// How long a line may take no bytes.
+/// Longest time for which a line may take no bytes.
 const SENDING: Duration = Duration::from_secs(1);
 /// Ticks from one recorded record to the next.
 const EVERY_TICK: u16 = 1;
-/// What can be typed, and what it does.
+/// The commands that can be typed, and their meanings.
 const WORDS: [(&str, &str, &str); 17] = [
     ("help", "", "show this"),
     ("status", "", "mode, fault, counts, torques, what limits, and what went over the line"),
@@ -148,9 +148,9 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
     }
 }
 
-/// Why a script ended early.
+/// The reason for which a script ended early.
 enum Broken {
-    /// What a line asked for was not done.
+    /// A line was not done.
     Refused,
     /// A line has no meaning.
     Misunderstood(anyhow::Error),
@@ -191,7 +191,7 @@ impl Typed {
     }
 }
 
-/// Whether the status is still to be shown.
+/// The state of a question for the status.
 #[derive(PartialEq)]
 enum Status {
     Shown,
@@ -208,7 +208,7 @@ struct Console {
     typed: Typed,
     joint_count: usize,
     period_us: u32,
-    /// What the firmware was built with, if that is known.
+    /// The hand that the firmware was built with, if it is known.
     hand: Option<HandModel>,
     /// Of a hand that is known, with the signs and zeros in force.
     encoders: Vec<Encoder>,
@@ -225,7 +225,7 @@ struct Console {
     interrupts: u32,
     is_quitting: bool,
     is_over: bool,
-    /// Why the script ends early, if it does.
+    /// The reason for which the script ends early, if it does.
     broken: Option<Broken>,
 }
 
@@ -676,12 +676,12 @@ fn say(line: impl Display) -> anyhow::Result<()> {
     writeln!(io::stdout().lock(), "{line}").context("cannot print")
 }
 
-/// Why the line ended.
+/// Returns the error of a line that was lost.
 fn lost(error: TransportError) -> anyhow::Error {
     anyhow!(error).context("the line is lost")
 }
 
-/// What was asked for, as it was typed.
+/// Returns the words of a request, as it was typed.
 fn name(request: &Request) -> String {
     let indexed = |parameter: Parameter, index| match parameter.each() {
         Each::Hand if index == 0 => parameter.to_string(),

@@ -22,7 +22,7 @@ use std::time::{Duration, Instant};
 
 /// From one picture to the next.
 const FRAME: Duration = Duration::from_millis(40);
-/// How long a stop before the end may take: it is sent five times, 100 ms apart.
+/// Longest time that a stop before the end may take: it is sent five times, 100 ms apart.
 const STOPPING: Duration = Duration::from_secs(1);
 /// Within this time a signal is seen, or the program ends without ceremony.
 const NOTICING: Duration = Duration::from_secs(5);
@@ -53,7 +53,7 @@ pub(crate) struct Arguments {
     /// Rate of the line, baud [default: the fastest that hand and adapter can]
     #[arg(long, value_name = "BAUD", conflicts_with = "file")]
     baud: Option<u32>,
-    /// Which device of the recording; the first, if nothing is said
+    /// Device of the recording; the first, if nothing is said
     #[arg(long, value_name = "NAME", requires = "file")]
     device: Option<String>,
     /// Record everything that goes over the line, while it is watched
@@ -189,7 +189,7 @@ impl Drop for Restored {
     }
 }
 
-/// How it ended.
+/// The end of the view.
 enum Ended {
     /// After a stop, and whether that is confirmed.
     Stopped(bool),
@@ -212,13 +212,13 @@ fn wait_for_stop(live: &Live) -> bool {
     false
 }
 
-/// What is shown, and how.
+/// The view and its state.
 struct Monitor {
     input: Input,
     situation: Situation,
     /// Signals that were seen.
     signals: u32,
-    /// Why the recording has ended too early, if it has.
+    /// The reason for which the recording has ended too early, if it has.
     unrecorded: Option<RecordingError>,
     plot: usize,
     window: usize,
@@ -335,7 +335,7 @@ impl Monitor {
         }
     }
 
-    /// Whether another signal to end came.
+    /// Returns `true` if another signal to end came.
     fn signalled(&mut self) -> bool {
         let signals = SIGNALS.load(Ordering::Relaxed);
         SEEN.store(signals, Ordering::Relaxed);
@@ -364,7 +364,7 @@ impl Monitor {
         Ok(())
     }
 
-    /// What a key of the next frame wants, as soon as it is pressed.
+    /// Returns the intent of the next key that is pressed within a frame.
     fn intent(&mut self, frame: Duration, now: Duration) -> anyhow::Result<Option<Intent>> {
         let until = Instant::now() + frame;
         loop {
@@ -392,7 +392,7 @@ impl Monitor {
         self.situation.may_have_torque()
     }
 
-    /// What concerns the view alone.
+    /// Does what concerns the view alone.
     fn look(&mut self, intent: Intent, model: &Model) {
         let step =
             |at: usize, by: isize, count: usize| (at as isize + by).rem_euclid(count as isize) as usize;

@@ -20,7 +20,7 @@ use std::path::{Path, PathBuf};
 
 /// The hand whose firmware is measured if no scene says otherwise.
 const BENCH_SCENE: &str = "cube";
-/// What the firmware measures: key, and what it is.
+/// The firmware's measurements: key, and what it is.
 const FIGURES: [(&str, &str); 6] = [
     ("law_gravity_off", "grasp law without gravity compensation"),
     ("law_gravity_on", "grasp law with gravity compensation"),
@@ -76,7 +76,7 @@ const TICKS: u32 = 10_000;
 /// The same through the emulated serial port, which takes a hundred times as long.
 const TICKS_BY_UART: u32 = 1_000;
 
-/// What `--json` prints.
+/// The result as `--json` prints it.
 #[derive(Serialize)]
 struct Report<'a> {
     /// Ticks of the grasp; those before it are compared, too.

@@ -12,7 +12,7 @@ pub(super) fn given(port: Option<&str>) -> anyhow::Result<&str> {
     port.ok_or_else(|| anyhow!("which port? Name it with --port; {}", ports_in_words()))
 }
 
-/// Why nobody answers, with the ports that there are.
+/// Returns the error of a silent port, with the ports that there are.
 pub(super) fn explained(error: TalkError) -> anyhow::Error {
     match error {
         TalkError::NobodyThere(..) => anyhow!("{error}; {}", ports_in_words()),

@@ -20,9 +20,9 @@ use std::sync::mpsc::{self, Receiver, RecvTimeoutError, Sender};
 use std::thread;
 use std::time::{Duration, Instant};
 
-/// How long nothing is looked at but the line.
+/// Longest time for which nothing is looked at but the line.
 const SLICE: Duration = Duration::from_millis(10);
-/// How long a line may take no bytes.
+/// Longest time for which a line may take no bytes.
 const SENDING: Duration = Duration::from_secs(1);
 /// From one look for a port that is lost to the next.
 const LOOK_AGAIN: Duration = Duration::from_millis(500);
@@ -49,7 +49,7 @@ pub(crate) struct Arguments {
     /// The file to write
     #[arg(long, value_name = "FILE.mcap")]
     out: PathBuf,
-    /// How long, s [default: until Ctrl-C]
+    /// Length of the recording, s [default: until Ctrl-C]
     #[arg(long, value_name = "S", value_parser = seconds)]
     duration: Option<f64>,
     /// A hand's file, if it is not built in: for angles and the joints' names; may be repeated
@@ -75,17 +75,17 @@ fn seconds(text: &str) -> Result<f64, String> {
     seconds.ok_or("seconds from 0.001 to 10000000 are wanted".to_owned())
 }
 
-/// What `--json` prints.
+/// The result as `--json` prints it.
 #[derive(Serialize)]
 struct Report {
     file: String,
     bytes: u64,
     seconds_s: f64,
     records: u64,
-    /// Whether every record that was asked for is there.
+    /// `true` if every record that was asked for is there.
     whole: bool,
     devices: Vec<Device>,
-    /// What ended the recording, if that was not the user.
+    /// The error that ended the recording, if it was not the user.
     error: Option<String>,
 }
 
@@ -109,24 +109,24 @@ struct Device {
     decimation: u32,
 }
 
-/// What a thread tells.
+/// News of a thread.
 enum News {
     /// A line for the user.
     Words(usize, String),
-    /// What became of the link in the last second.
+    /// The totals of the link in the last second.
     Status(usize, Totals),
     /// It has ended.
     End(usize, Ended),
 }
 
-/// How the recording of a port ended.
+/// The end of the recording of a port.
 struct Ended {
     totals: Totals,
     gaps: Duration,
     error: Option<Trouble>,
 }
 
-/// What ends a recording early.
+/// The cause of an early end.
 enum Trouble {
     /// Nobody is there, or nobody that can be talked to.
     Nobody(anyhow::Error),
@@ -345,9 +345,9 @@ struct Attendant<'a> {
     gaps: Duration,
 }
 
-/// Why a talk ended.
+/// The end of a talk.
 enum Cut {
-    /// That is the end.
+    /// The end of the recording.
     End,
     /// Nothing comes over the line.
     Line(anyhow::Error),
@@ -457,7 +457,7 @@ impl Attendant<'_> {
         }
     }
 
-    /// What there is to do, and to wait for, at one time.
+    /// Does what there is to do at one time, and waits.
     fn turn(
         &mut self,
         talk: &mut Talk,

@@ -1,4 +1,4 @@
-//! What commands that read a recording have in common.
+//! The part that commands which read a recording have in common.
 
 use anyhow::{Context, bail};
 use blindgrasp::record::mcap::{Damage, Entries, Recording};
@@ -48,12 +48,12 @@ pub(super) fn chosen_device(recording: &Recording, wanted: Option<&str>) -> anyh
     }
 }
 
-/// When a recording begins, ns.
+/// Returns the beginning of a recording, ns.
 pub(super) fn start_ns(recording: &Recording) -> u64 {
     recording.span().map_or(0, |(start, _)| start.0)
 }
 
-/// What is wrong with a recording as far as it was read, in words.
+/// Returns the damage of a recording as far as it was read, in words.
 pub(super) fn damage_of(recording: &Recording, entries: &Entries) -> Option<String> {
     let damage = Damage { unfinished: !recording.is_finished(), ..entries.damage().clone() };
     (!damage.is_none() || damage.unfinished).then(|| damage.to_string())

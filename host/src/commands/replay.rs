@@ -44,7 +44,7 @@ pub(crate) struct Arguments {
     json: bool,
 }
 
-/// What `--json` prints.
+/// The result as `--json` prints it.
 #[derive(Serialize)]
 struct Timed {
     #[serde(flatten)]

@@ -1,4 +1,4 @@
-//! What is varied: a key, and the values that it takes.
+//! The axis of a sweep: a key, and the values that it takes.
 
 use super::unit;
 use std::collections::BTreeSet;
@@ -19,7 +19,7 @@ pub struct Axis {
     pub key: String,
     /// Its values.
     pub values: Vec<Value>,
-    /// How they are spread.
+    /// The spread of the values.
     pub scale: Scale,
 }
 
@@ -32,7 +32,7 @@ pub struct Value {
     pub number: Option<f64>,
 }
 
-/// How values are spread.
+/// The spread of values.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Scale {
     /// Evenly.
@@ -43,7 +43,7 @@ pub enum Scale {
     Listed,
 }
 
-/// What is wrong with a `KEY=VALUES`.
+/// An error in a `KEY=VALUES`.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 #[error("--vary: {key}: {problem}; write KEY=FROM..TO:N, KEY=FROM..TO:N:log or KEY=A,B,C")]
 pub struct AxisError {
@@ -85,7 +85,7 @@ impl Axis {
         unit::of(&self.key)
     }
 
-    /// Whether all values are numbers.
+    /// Returns `true` if all values are numbers.
     pub fn is_numeric(&self) -> bool {
         self.values.iter().all(|value| value.number.is_some())
     }
@@ -175,7 +175,7 @@ impl Range {
     }
 }
 
-/// How many digits keep rounding below a thousandth of a step in the natural logarithm.
+/// Returns the number of digits that keep rounding below a thousandth of a step in the natural logarithm.
 fn digits(step: f64) -> usize {
     let needed = 1.0 + (500.0 / step.abs()).log10().ceil();
     needed.clamp(FEWEST_DIGITS as f64, MOST_DIGITS as f64) as usize

@@ -1,4 +1,4 @@
-//! Where the grasp begins to fail, for sweeps of one number; and the bisection that finds it more closely.
+//! The edges at which the grasp begins to fail, for sweeps of one number; and the bisection that finds them more closely.
 
 use super::axis::{Axis, Scale, Value};
 use super::plan::Plan;
@@ -26,21 +26,21 @@ pub struct Stretch {
     pub from: f64,
     /// The largest.
     pub to: f64,
-    /// Whether the grasp is held, with every seed.
+    /// `true` if the grasp is held, with every seed.
     pub held: bool,
 }
 
 /// A sweep that came to its end, or to the one that somebody wanted.
 #[derive(Clone, Debug)]
 pub struct Swept {
-    /// What came of the runs, in the order of their numbers.
+    /// The results of the runs, in the order of their numbers.
     pub rows: Vec<Row>,
-    /// Whether they are all there.
+    /// `true` if they are all there.
     pub is_whole: bool,
 }
 
-/// Where the grasp begins to fail, in the order of the values; nothing if several keys are varied, or words. Values that the
-/// scene refuses count as if they were not there.
+/// Returns the edges at which the grasp begins to fail, in the order of the values; nothing if several keys are varied,
+/// or words. Values that the scene refuses count as if they were not there.
 pub fn edges(plan: &Plan, rows: &[Row]) -> Vec<Edge> {
     let stretches = stretches(plan, rows);
     let edge = |pair: &[Stretch]| {
@@ -50,7 +50,8 @@ pub fn edges(plan: &Plan, rows: &[Row]) -> Vec<Edge> {
     stretches.windows(2).map(edge).collect()
 }
 
-/// Where the grasp is held and where it is lost, in the order of the values; between them are the [`edges`].
+/// Returns the stretches in which the grasp is held and in which it is lost, in the order of the values; between them
+/// are the [`edges`].
 pub fn stretches(plan: &Plan, rows: &[Row]) -> Vec<Stretch> {
     let verdicts = verdicts(plan, rows);
     let same = verdicts.chunk_by(|(_, held), (_, next)| held == next);

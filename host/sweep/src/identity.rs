@@ -1,11 +1,11 @@
-//! Which sweep it is: what has to be the same for rows of two runs of the program to belong together.
+//! The identity of a sweep: what has to be the same for rows of two runs of the program to belong together.
 
 use super::plan::Plan;
 use blindgrasp_shared::telemetry::INTERFACE_VERSION;
 use serde::{Deserialize, Serialize};
 use std::sync::OnceLock;
 
-/// Which sweep it is.
+/// The identity of a sweep.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Identity {
     /// Version of the program, and the checksum of its file: another build may compute other bits.
@@ -38,7 +38,7 @@ impl Identity {
         }
     }
 
-    /// What of another one differs from this, in words.
+    /// Returns the difference from another one, in words.
     pub(super) fn difference(&self, another: &Self) -> Option<String> {
         if self.program != another.program {
             return Some(format!("the program ({}, now {})", another.program, self.program));

@@ -21,7 +21,7 @@ const MAGIC: &[u8; 8] = b"BGSWEEP1";
 #[derive(Debug)]
 pub struct Journal {
     path: PathBuf,
-    /// Where checksums go on from.
+    /// The value that checksums go on from.
     seed: u64,
     end: Mutex<End>,
 }
@@ -33,7 +33,7 @@ struct End {
     length: u64,
 }
 
-/// What a journal had in it.
+/// The content of a journal.
 #[derive(Debug, Default)]
 pub struct Found {
     /// The runs that are done, in the order in which they were.
@@ -42,7 +42,7 @@ pub struct Found {
     pub dropped: u64,
 }
 
-/// Why a sweep can't have its journal.
+/// The reason for which a sweep can't have its journal.
 #[derive(Debug, Error)]
 pub enum JournalError {
     /// It is another's.
@@ -53,7 +53,7 @@ pub enum JournalError {
     Another {
         /// The journal.
         path: PathBuf,
-        /// What is another.
+        /// The difference.
         difference: String,
     },
     /// It is something else, or its beginning is damaged.
@@ -73,7 +73,7 @@ pub enum JournalError {
     Io {
         /// The journal.
         path: PathBuf,
-        /// What it said.
+        /// The cause.
         source: io::Error,
     },
 }
@@ -168,7 +168,7 @@ impl Journal {
     }
 }
 
-/// How a file begins.
+/// The beginning of a file.
 enum Begun<'a> {
     /// As a journal that was not even begun: nothing is in it.
     Not,

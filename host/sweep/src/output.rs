@@ -10,14 +10,14 @@ use std::io::{self, Write as _};
 use std::path::{Path, PathBuf};
 use thiserror::Error;
 
-/// Where a sweep is written to.
+/// The files that a sweep is written to.
 #[derive(Clone, Debug)]
 pub struct Output {
     path: PathBuf,
     format: Format,
 }
 
-/// Why a sweep can't be written.
+/// The reason for which a sweep can't be written.
 #[derive(Debug, Error)]
 pub enum OutputError {
     /// Its ending says nothing.
@@ -37,7 +37,7 @@ pub enum OutputError {
     Io {
         /// The file.
         path: PathBuf,
-        /// What it said.
+        /// The cause.
         source: io::Error,
     },
     /// The table can't be written.
@@ -45,7 +45,7 @@ pub enum OutputError {
     Table {
         /// The file.
         path: PathBuf,
-        /// Why.
+        /// The cause.
         source: TableError,
     },
     /// A picture can't be drawn.
@@ -53,7 +53,7 @@ pub enum OutputError {
     Draw {
         /// The file that it was for.
         path: PathBuf,
-        /// What the drawing library said.
+        /// The error of the drawing library.
         reason: String,
     },
 }

@@ -1,22 +1,22 @@
-//! What came of a sweep, in a few numbers.
+//! The results of a sweep in a few numbers.
 
 use super::edge::{Edge, edges};
 use super::plan::Plan;
 use super::run::{Outcome, Row};
 use serde::Serialize;
 
-/// What came of a sweep.
+/// The results of a sweep.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Overview {
     /// Name of the scene.
     pub scene: String,
-    /// What was varied.
+    /// The keys that were varied.
     pub varied: Vec<Varied>,
-    /// How many seeds each combination was run with.
+    /// The number of seeds that each combination was run with.
     pub seeds: u32,
-    /// How many runs there were.
+    /// The number of runs.
     pub runs: usize,
-    /// How many of them bisection added.
+    /// The number of them that bisection added.
     pub added: usize,
     /// In how many the grasp held.
     pub held: usize,
@@ -24,15 +24,15 @@ pub struct Overview {
     pub settled: usize,
     /// In how many the grasp was lost.
     pub lost: usize,
-    /// How many the scene refused.
+    /// The number of them that the scene refused.
     pub refused: usize,
-    /// Why it refused the first of them.
+    /// The reason for which it refused the first of them.
     pub refused_reason: Option<String>,
-    /// Where the grasp begins to fail, if one key was varied that takes numbers.
+    /// The edges at which the grasp begins to fail, if one key was varied that takes numbers.
     pub edges: Vec<Edge>,
 }
 
-/// What was varied.
+/// A key that was varied.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Varied {
     /// The key.

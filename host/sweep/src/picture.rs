@@ -9,7 +9,7 @@ use blindgrasp_view::Files;
 /// Listed numbers that are further apart than this lie by their logarithms.
 const MOST_LINEAR: f64 = 50.0;
 
-/// Whether a sweep has a picture: if one or two keys are varied.
+/// Returns `true` if a sweep has a picture: if one or two keys are varied.
 pub(super) fn is_drawn(plan: &Plan) -> bool {
     (1..=2).contains(&plan.axes().len())
 }

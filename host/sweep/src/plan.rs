@@ -32,7 +32,7 @@ struct Opened {
     first: Result<(usize, SceneFile), SceneError>,
 }
 
-/// Why a sweep can't be run at all.
+/// The reason for which a sweep can't be run at all.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 pub enum PlanError {
     /// A key stands in two places.
@@ -40,7 +40,7 @@ pub enum PlanError {
     Twice {
         /// The key.
         key: String,
-        /// Where it stands.
+        /// Its place.
         problem: &'static str,
     },
     /// There are too many.
@@ -115,27 +115,27 @@ impl Plan {
         self.first().map_or(&self.scene, |file| &file.name)
     }
 
-    /// What is varied.
+    /// Returns the axes.
     pub fn axes(&self) -> &[Axis] {
         &self.axes
     }
 
-    /// What is set for all runs.
+    /// Returns the settings of all runs.
     pub fn base_settings(&self) -> &[Setting] {
         &self.settings
     }
 
-    /// How many seeds each combination is run with.
+    /// Returns the number of seeds that each combination is run with.
     pub fn seeds(&self) -> u32 {
         self.seeds
     }
 
-    /// How many runs there are.
+    /// Returns the number of runs.
     pub fn runs(&self) -> usize {
         self.axes.iter().map(|axis| axis.values.len()).product::<usize>() * self.seeds as usize
     }
 
-    /// How many of them were added by bisection.
+    /// Returns the number of them that were added by bisection.
     pub fn added(&self) -> usize {
         self.runs() - self.grid
     }
@@ -204,8 +204,8 @@ impl Plan {
         firsts.min_by_key(|(run, _)| *run).map(|(_, file)| file)
     }
 
-    /// What the scene's files say, for each combination that axes name: an effective configuration, or an error. What settings
-    /// and axes change is in it as the first run has it.
+    /// Returns the content of the scene's files, for each combination that axes name: an effective configuration, or an
+    /// error. What settings and axes change is in it as the first run has it.
     pub(super) fn contents(&self) -> Vec<String> {
         let content = |opened: &Opened| match &opened.first {
             Ok((_, file)) => toml::to_string(file).unwrap_or_default(),
@@ -214,7 +214,7 @@ impl Plan {
         self.drafts.iter().map(content).collect()
     }
 
-    /// What the values of an axis are. Numbers are whole if that is what the key takes.
+    /// Returns the kind of the values of an axis. Numbers are whole if that is what the key takes.
     pub fn kind(&self, axis: usize) -> Kind {
         let Axis { key, values, .. } = &self.axes[axis];
         let effective = || self.first().and_then(|file| toml::Value::try_from(file).ok());

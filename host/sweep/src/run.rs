@@ -12,11 +12,11 @@ use std::convert::Infallible;
 pub struct Row {
     /// Number of the run in its plan, from 0.
     pub run: usize,
-    /// What came of it.
+    /// The outcome.
     pub outcome: Outcome,
 }
 
-/// What came of a run.
+/// The outcome of a run.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Outcome {
     /// The scene refuses the values, for this reason.
@@ -68,7 +68,7 @@ pub fn run_some<E: Send>(
     Ok(rows.into_iter().flatten().collect())
 }
 
-/// What comes of a run; nothing if it was stopped.
+/// Returns the outcome of a run; nothing if it was stopped.
 fn outcome(plan: &Plan, run: usize, goes_on: impl Fn() -> bool) -> Option<Outcome> {
     let scene = match plan.scene(run) {
         Ok(scene) => scene,

@@ -5,7 +5,7 @@ use super::run::{Outcome, Row};
 use blindgrasp_record::table::{Cell, Heading, Kind, Layout};
 use blindgrasp_sim::summary::{Last, Summary};
 
-/// What a column says of a run that ran, and of each finger at its end.
+/// The cell of a column for a run that ran, and for each finger at its end.
 type OfSummary = fn(&Summary) -> Cell<'_>;
 type OfFingers = fn(&Last) -> &[f64];
 
@@ -71,7 +71,7 @@ impl<V> Described<V> {
     }
 }
 
-/// Where a column's values come from.
+/// The source of a column's values.
 #[derive(Clone, Copy)]
 enum Source {
     Run,

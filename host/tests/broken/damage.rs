@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 /// Copies for each reader.
 const COPIES: usize = 500;
 
-/// What each reader starts from: the corpus's files for it, and shipped ones.
+/// The files that each reader starts from: the corpus's files for it, and shipped ones.
 const READERS: [(Reader, &str, &str, &str); 6] = [
     (Reader::Urdf, "urdf-", ".urdf", ""),
     (Reader::Stl, "stl-", ".stl", "objects"),
@@ -19,7 +19,7 @@ const READERS: [(Reader, &str, &str, &str); 6] = [
     (Reader::Scene, "scene-", ".toml", "scenes"),
 ];
 
-/// What may stand in the place of something else.
+/// The pieces that may stand in the place of something else.
 const PIECES: [&[u8]; 16] = [
     b"0",
     b"-1",

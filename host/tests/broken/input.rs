@@ -19,10 +19,10 @@ pub(crate) struct Table {
 pub(crate) struct Input {
     /// Its name.
     pub(crate) file: String,
-    /// What is wrong with it.
+    /// The fault.
     #[serde(rename = "what")]
     _what: String,
-    /// How it is made, if it is not beside the table.
+    /// The way in which it is made, if it is not beside the table.
     made: Option<Made>,
     /// A command that has to succeed first.
     pub(crate) first: Option<String>,
@@ -37,7 +37,7 @@ pub(crate) struct Input {
     pub(crate) findings: Option<String>,
 }
 
-/// What would be too large for the repository.
+/// A file that would be too large for the repository.
 #[derive(Deserialize)]
 #[serde(untagged, deny_unknown_fields)]
 enum Made {

@@ -38,7 +38,7 @@ fn copy_of_corpus() -> tempfile::TempDir {
     folder
 }
 
-/// What a command said, and what it took.
+/// The output of a command, and what it took.
 struct Said {
     exit: Option<i32>,
     stdout: String,
@@ -76,7 +76,7 @@ fn run(arguments: &str, folder: &Path) -> Said {
     Said { exit: status.code(), stdout, stderr, processor_s: processor_s(&children()) - processor_s(&before) }
 }
 
-/// What all children that have ended took. The peak of memory is that of the largest.
+/// Returns the usage of all children that have ended. The peak of memory is that of the largest.
 fn children() -> Usage {
     getrusage(UsageWho::RUSAGE_CHILDREN).unwrap()
 }
@@ -94,7 +94,7 @@ fn peak_kib() -> u64 {
     if cfg!(target_vendor = "apple") { peak >> 10 } else { peak }
 }
 
-/// What differs from what is expected.
+/// Returns the differences from what is expected.
 fn differences(input: &Input, said: &Said) -> Vec<String> {
     let mut wrong = Vec::new();
     let mut compare = |what: &str, expected: &str, found: &str| {

@@ -1,5 +1,5 @@
-//! What holds of any bytes that are given to a reader: they are refused in one line, or what they describe can be written
-//! and read again as the same. Shared with the fuzz targets (`fuzz/`).
+//! The property of any bytes that are given to a reader: they are refused in one line, or what they describe can be
+//! written and read again as the same. Shared with the fuzz targets (`fuzz/`).
 
 use blindgrasp::model::file::{ObjectFile, SCHEMA};
 use blindgrasp::model::inspect::hand::HandCheck;
@@ -55,7 +55,7 @@ impl Reader {
     }
 }
 
-/// What it is, unless it was refused as it should be.
+/// Returns the value, unless it was refused as it should be.
 fn accepted<T>(result: Result<T, SceneError>) -> Option<T> {
     let error = match result {
         Ok(accepted) => return Some(accepted),
@@ -118,7 +118,7 @@ fn object(name: &str) -> bool {
     accepted(ObjectFile::load(name)).is_some_and(|file| round_trip(&file))
 }
 
-/// Whether it is a body; if so, it is the same once written and read again.
+/// Returns `true` if it is a body; if so, it is the same once written and read again.
 fn round_trip(file: &ObjectFile) -> bool {
     let Ok(body) = file.body(&mut Vec::new()) else { return false };
     assert!(body.inertia_kg_m2.iter().all(|v| v.is_finite()) && body.mass_kg > 0.0);

@@ -9,10 +9,10 @@ pub(crate) const FLASH: u32 = 0x0800_0000;
 pub(crate) const RAM: u32 = 0x2000_0000;
 /// One past its end.
 pub(crate) const RAM_END: u32 = 0x2002_0000;
-/// Where the code of [`Elf::good`] starts.
+/// The address of the code of [`Elf::good`].
 pub(crate) const RESET: u32 = FLASH + 0x188;
 
-/// Where a segment is stored and used, its bytes, and how much memory it takes.
+/// A segment with its addresses, its bytes, and the memory that it takes.
 #[derive(Clone)]
 pub(crate) struct Segment {
     pub(crate) stored: u32,
@@ -54,7 +54,8 @@ pub(crate) fn identity(image: &Image<'_>) -> Vec<u8> {
 }
 
 impl Elf {
-    /// What the linker makes of a firmware: vectors, code and constants; variables that start with a value, and others.
+    /// Returns a firmware as the linker makes it: vectors, code and constants; variables that start with a value, and
+    /// others.
     pub(crate) fn good(image: &Image<'_>) -> Self {
         let mut flash = vec![0; 0x188];
         flash[..4].copy_from_slice(&RAM_END.to_le_bytes());

@@ -27,7 +27,7 @@ pub(crate) const PATIENCE: Patience =
 
 const MOST_BYTES: usize = most_bytes(Reply::<MAX_JOINTS>::MOST_BYTES);
 
-/// What is wrong.
+/// A fault of a device.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Wrong {
     Nothing,

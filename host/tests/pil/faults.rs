@@ -1,4 +1,4 @@
-//! What goes wrong in a grasp, with the whole device in the loop: alone, and behind a link with its twin.
+//! Faults in a grasp, with the whole device in the loop: alone, and behind a link with its twin.
 
 use crate::device::{Firmware, PATIENCE, Wrong};
 use blindgrasp::device::client::Client;

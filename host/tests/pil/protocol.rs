@@ -1,4 +1,4 @@
-//! What is said over the link, and what is made of it when something is wrong.
+//! Messages of the link, and the answers to wrong ones.
 
 use crate::device::{Firmware, PATIENCE, Wrong};
 use blindgrasp::device::client::Client;

@@ -54,7 +54,7 @@ impl Bench {
         fs::read_to_string(self.path(name)).expect("the script ran").trim().to_owned()
     }
 
-    /// That neither the process, nor one that it has started, nor its folder is there.
+    /// Asserts that neither the process, nor one that it has started, nor its folder is there.
     fn assert_nothing_left(&self) {
         let group = self.note("id");
         let deadline = Instant::now() + Duration::from_secs(2);
@@ -67,7 +67,7 @@ impl Bench {
     }
 }
 
-/// Whether a process of the group is there.
+/// Returns `true` if a process of the group is there.
 fn is_alive(group: &str) -> bool {
     killpg(Pid::from_raw(group.parse().expect("a number")), None).is_ok()
 }

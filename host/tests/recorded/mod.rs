@@ -26,10 +26,10 @@ pub(crate) type AnyConfig = Config<MAX_JOINTS>;
 
 /// Time of a tick, ns.
 pub(crate) const TICK_NS: u64 = 1_000_000;
-/// When recordings begin, ns since 1970.
+/// The beginning of recordings, ns since 1970.
 pub(crate) const START_NS: u64 = 1_700_000_000_000_000_000;
 
-/// What becomes of a record that a device sends.
+/// The fate of a record that a device sends.
 #[derive(Clone, Copy, PartialEq)]
 pub(crate) enum Fate {
     Arrives,
@@ -84,7 +84,7 @@ pub(crate) struct Session {
     pub(crate) sent: u64,
     pub(crate) arrived: u64,
     pub(crate) dropped: u32,
-    /// How many records wait for the line in each tick.
+    /// Returns the number of records that wait for the line in each tick.
     pub(crate) waiting: fn(u32) -> usize,
 }
 
@@ -105,7 +105,7 @@ fn device(model: &HandModel) -> Device<MAX_JOINTS, MAX_FINGERS> {
     Device::new(Params::new(model.hand.cast(), &model.config).unwrap(), identity)
 }
 
-/// What the device of a hand says of itself.
+/// Returns the description that the device of a hand gives of itself.
 pub(crate) fn about(hand: &Hand) -> About {
     let model = &hand.model;
     About {
@@ -159,7 +159,7 @@ impl Session {
         }
     }
 
-    /// When the present tick is.
+    /// Returns the time of the present tick.
     pub(crate) fn now(&self) -> Stamp {
         Stamp(START_NS + u64::from(self.time) * TICK_NS)
     }
@@ -338,7 +338,7 @@ pub(crate) fn simulation(
     records
 }
 
-/// What a controller is told of its joints.
+/// The readings that a controller gets of its joints.
 pub(crate) enum Told {
     Counts([i32; MAX_JOINTS]),
     Ideal,

@@ -15,7 +15,7 @@ use blindgrasp_shared::telemetry::{INTERFACE_VERSION, List};
 use blindgrasp_shared::tick::Params;
 use std::path::Path;
 
-/// Who a hand of `models/hands` is.
+/// Returns the description of a hand of `models/hands`.
 pub(crate) fn about(hand: &str) -> About {
     let file = HandFile::load(hand).unwrap();
     let model = HandModel::load(hand).unwrap();
@@ -123,7 +123,7 @@ pub(crate) fn read(path: &Path) -> (Vec<Entry>, blindgrasp::record::mcap::Damage
     (all, damage, recording)
 }
 
-/// Whether an entry is one that the writer made by itself.
+/// Returns `true` if an entry is one that the writer made by itself.
 pub(crate) fn is_derived(entry: &Entry) -> bool {
     matches!(&entry.what, What::Event { about, .. } if about != "event")
 }

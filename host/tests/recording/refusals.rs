@@ -1,4 +1,4 @@
-//! What is no recording, or none that this program knows.
+//! Files that are no recording, or none that this program knows.
 
 use crate::hand::{Hand, about};
 use blindgrasp::record::mcap::{Decoder, Recording, RecordingError, Stamp, Writer};

@@ -1,4 +1,4 @@
-//! What is written comes back.
+//! Everything that is written comes back.
 
 use crate::hand::{Hand, about, is_derived, read, settings};
 use blindgrasp::record::mcap::{Arrival, Decoder, Entry, Level, Stamp, What, Writer};

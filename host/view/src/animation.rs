@@ -19,7 +19,7 @@ const SAMPLES: usize = 2;
 const DELAY_CS: u16 = 8;
 /// The last frame stays longer, so that one sees where the run ended.
 const LAST_DELAY_CS: u16 = 120;
-/// What playing should take, s.
+/// Time that playing should take, s.
 const PLAYING_S: f64 = 6.0;
 /// Speeds to choose from.
 const SPEEDS: [f64; 10] = [0.1, 0.2, 0.5, 1.0, 2.0, 3.0, 5.0, 10.0, 20.0, 50.0];
@@ -27,7 +27,7 @@ const MOST_FRAMES: usize = 150;
 /// Bytes.
 const LARGEST_FILE: usize = 1_700_000;
 
-/// When the frames are, s since the start of the run, and how many seconds of the run pass in a second.
+/// The times of the frames, s since the start of the run, and how many seconds of the run pass in a second.
 pub(super) struct Schedule {
     pub(super) times: Vec<f64>,
     speed: f64,

@@ -1,9 +1,10 @@
-//! Where a picture is taken from. The projection is parallel, so that lengths can be read off against a scale bar.
+//! The place from which a picture is taken. The projection is parallel, so that lengths can be read off against a scale
+//! bar.
 
 use blindgrasp_shared::math::Real;
 use nalgebra::Vector3;
 
-/// How steeply the camera looks down, degrees: usually, and where things happen on both sides of the palm.
+/// The angle at which the camera looks down, degrees: usually, and where things happen on both sides of the palm.
 const ELEVATION_DEG: f64 = 30.0;
 const LOW_ELEVATION_DEG: f64 = 12.0;
 
@@ -64,7 +65,7 @@ impl View {
         Self { right: turn(self.right), up: turn(self.up), back: turn(self.back) }
     }
 
-    /// Where a point is in the picture plane, to the right and up, m.
+    /// Returns the place of a point in the picture plane, to the right and up, m.
     pub(super) fn flat(&self, point: &Vector3<f64>) -> [f64; 2] {
         [self.right.dot(point), self.up.dot(point)]
     }

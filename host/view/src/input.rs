@@ -1,4 +1,4 @@
-//! What a report is made from.
+//! The data of a report.
 
 use blindgrasp_body::Hand;
 use blindgrasp_body::polyhedron::Polyhedron;

@@ -47,7 +47,8 @@ use std::{fs, io};
 /// A picture as a PNG file, and as an SVG file; or why it can't be drawn.
 pub type Files = [Result<Vec<u8>, String>; 2];
 
-/// Why a report could not be written. The message has the cause in it, so that it reads whole on its own.
+/// The reason for which a report could not be written. The message has the cause in it, so that it reads whole on its
+/// own.
 #[derive(Debug, thiserror::Error)]
 pub enum ReportError {
     /// The directory is missing and can't be made.
@@ -55,7 +56,7 @@ pub enum ReportError {
     Directory {
         /// The directory.
         path: PathBuf,
-        /// What the system said.
+        /// The error of the system.
         cause: io::Error,
     },
     /// A file can't be written.
@@ -63,7 +64,7 @@ pub enum ReportError {
     Write {
         /// The file.
         path: PathBuf,
-        /// What the system said.
+        /// The error of the system.
         cause: io::Error,
     },
     /// A figure can't be drawn.
@@ -71,7 +72,7 @@ pub enum ReportError {
     Draw {
         /// The file that it was for.
         path: PathBuf,
-        /// What the drawing library said.
+        /// The error of the drawing library.
         reason: String,
     },
 }

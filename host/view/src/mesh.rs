@@ -14,13 +14,13 @@ pub(super) struct Triangle {
     pub(super) colour: Rgb,
 }
 
-/// What one picture shows.
+/// The triangles of one picture.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Mesh {
     pub(super) solid: Vec<Triangle>,
     /// Faces of one body that one can look through.
     pub(super) glass: Vec<Triangle>,
-    /// What shows in front of everything.
+    /// The triangles in front of everything.
     pub(super) marks: Vec<Triangle>,
 }
 

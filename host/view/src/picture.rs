@@ -14,7 +14,7 @@ pub(super) const HEIGHT: usize = 720;
 /// Every pixel is the mean of its square.
 const SAMPLES: usize = 3;
 
-/// Which picture of a run.
+/// The moment of a run that a picture shows.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Moment {
     Start,

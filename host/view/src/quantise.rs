@@ -94,7 +94,8 @@ fn median_cut(bins: Vec<Bin>, limit: usize) -> Vec<Rgb> {
 struct Spread {
     bins: Vec<Bin>,
     mean: [f64; 3],
-    /// Where they scatter most, and how much: the sum of squared distances from the mean; zero for a single colour.
+    /// The channel in which they scatter most, and how much: the sum of squared distances from the mean; zero for a
+    /// single colour.
     channel: usize,
     variance: f64,
 }

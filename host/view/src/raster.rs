@@ -6,7 +6,7 @@ use super::mesh::{Mesh, Triangle};
 use super::palette::Rgb;
 use nalgebra::Vector3;
 
-/// How much of what is behind it a pane of glass covers, from the side that faces the viewer and from the other.
+/// The share of what is behind it that a pane of glass covers, from the side that faces the viewer and from the other.
 const FRONT_COVER: f32 = 0.34;
 const REAR_COVER: f32 = 0.22;
 

@@ -22,7 +22,7 @@ const MANY_EDGES: usize = 500;
 /// The faces of a sharp edge have normals whose product is below this: 30 degrees.
 const SHARP: f64 = 0.866;
 
-/// What is the same for all moments of a run: sizes, the scale of the forces, and where to look from.
+/// The stage, which is the same for all moments of a run: sizes, the scale of the forces, and where to look from.
 #[derive(Clone, Debug)]
 pub(super) struct Stage {
     sizes: Sizes,
@@ -37,7 +37,7 @@ pub(super) struct Stage {
     pub(super) outline_m: f64,
 }
 
-/// How many moments of a run are looked at to find out how much room it takes.
+/// The number of moments of a run that are looked at to find out how much room it takes.
 const PROBES: usize = 16;
 
 impl Stage {
@@ -199,7 +199,7 @@ fn view(report: &Report<'_>, palms: &[Palm], postures: &[Posture]) -> View {
     View::on_grasp(&fingers, &(object - centre), passes_palm)
 }
 
-/// Where the points of a mesh are, roughly.
+/// The rough places of the points of a mesh.
 struct Cloud {
     centre: Vector3<f64>,
     radius: f64,

@@ -87,7 +87,7 @@ fn link(mesh: &mut Mesh, hand: &Hand, joint: usize, ends: [Vector3<f64>; 2], siz
     }
 }
 
-/// What an arm stands on.
+/// Draws the pedestal of an arm.
 fn pedestal(mesh: &mut Mesh, top: Vector3<f64>, sizes: &Sizes) {
     let radius = 3.0 * sizes.trunk_radius_m;
     mesh.cone([top - Vector3::z() * 0.4 * radius, top], [radius, 0.8 * radius], WIDE, PALM);

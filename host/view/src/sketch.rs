@@ -27,7 +27,7 @@ const WIDTH: f64 = 800.0;
 const VIEW: f64 = 380.0;
 /// Space at the edges.
 const MARGIN: f64 = 16.0;
-/// Where views begin, under the title.
+/// The top of the views, under the title.
 const TOP: f64 = 62.0;
 
 /// The square of a view: its upper left and lower right corner, with room for words around what is drawn.
@@ -68,7 +68,7 @@ fn frame_axes(svg: &mut Svg, camera: &Camera, origin: &Vector3<f64>, lengths_m: 
     }
 }
 
-/// Where a point is in the picture, pixels.
+/// Returns the place of a point in the picture, pixels.
 fn flat(camera: &Camera, point: &Vector3<f64>) -> [f64; 2] {
     let [x, y, _] = camera.project(point);
     [f64::from(x), f64::from(y)]

@@ -8,7 +8,7 @@ use std::sync::OnceLock;
 /// Plotters' text size in pixels per em, as in its SVG files.
 pub const SIZE_PER_EM: f64 = 1.24;
 
-/// Which point of the text sits at the given position.
+/// The point of the text that sits at the given position.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Anchor {
     /// Its left end.
@@ -19,7 +19,7 @@ pub enum Anchor {
     Right,
 }
 
-/// How the text is turned.
+/// The turn of the text.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Turn {
     /// Not at all.

@@ -1,4 +1,4 @@
-//! What goes over the wire, as the host has it: the messages of a hand of any size, and what they say.
+//! The wire, as the host has it: the messages of a hand of any size, and what they say.
 
 use blindgrasp_body::MAX_JOINTS;
 use blindgrasp_shared::command::Refusal;
@@ -16,10 +16,10 @@ pub type Packet = message::Packet<MAX_JOINTS>;
 pub type Request = message::Request<MAX_JOINTS>;
 /// The joints of a tick.
 pub type Sample = message::Sample<MAX_JOINTS>;
-/// What a tick did.
+/// The record of a tick.
 pub type Record = telemetry::Record<MAX_JOINTS>;
 
-/// What a firmware says of itself.
+/// The identity of a firmware.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Firmware {
     /// All of it in a line.
@@ -32,11 +32,11 @@ pub struct Firmware {
     pub hand_hash: u32,
     /// Joints of its hand.
     pub joint_count: usize,
-    /// What gives it its time.
+    /// The source of its clock.
     pub clock: Clock,
-    /// Why it started.
+    /// The cause of its start.
     pub reset: ResetCause,
-    /// How it ended before, if that was not in order.
+    /// The crash in which it ended before, if it did.
     pub crash: Option<Crash>,
     /// Level of its brown-out reset.
     pub brown_out: BrownOut,
@@ -44,7 +44,7 @@ pub struct Firmware {
     pub clock_hz: u32,
     /// The parameters that differ from the hand's file.
     pub changed: Vec<Parameter>,
-    /// What became at its start of the parameters that were saved; `None` where there is nothing to save to.
+    /// The result of restoring the saved parameters at its start; `None` where there is nothing to save to.
     pub restored: Option<Restored>,
 }
 
@@ -76,7 +76,7 @@ pub enum Answer {
     Identity {
         /// Number of the session.
         session: u16,
-        /// Who it is.
+        /// The identity.
         firmware: Firmware,
     },
     /// It is done.
@@ -87,19 +87,19 @@ pub enum Answer {
     Value(Setting),
     /// To `Burst`.
     Burst {
-        /// How many records there are.
+        /// The number of records.
         count: u16,
         /// The one that was asked for.
         record: Box<Record>,
     },
 }
 
-/// What came of a tick.
+/// The results of a tick.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Turned {
     /// The answer to the request that it took.
     pub answer: Option<Answer>,
-    /// What it did.
+    /// The record.
     pub record: Record,
 }
 
@@ -141,8 +141,8 @@ pub fn in_words(packet: Option<&Packet>) -> String {
     }
 }
 
-/// What a record tells of the whole hand in numbers that are worth a plot, in the order of the table of signals: real ones, and
-/// the time that the tick took.
+/// Returns the numbers of a record on the whole hand that are worth a plot, in the order of the table of signals: real
+/// ones, and the time that the tick took.
 pub fn scalars(record: &Record) -> Vec<(Signal, f32)> {
     let mut scalars = Vec::with_capacity(16);
     record.tell(|told| match told.value {

@@ -1,10 +1,10 @@
-//! What of a body rises above the plane of one of its faces: what a fingertip on that face may run into.
+//! The parts of a body that rise above the plane of one of its faces: what a fingertip on that face may run into.
 
 use super::Polyhedron;
 use blindgrasp_shared::math::{Real, norm};
 use nalgebra::Vector3;
 
-/// How far above a face something has to be to count, in units of the body's extent: rounding.
+/// Height above a face from which on something counts, in units of the body's extent: rounding.
 const LEVEL: f64 = 1e-9;
 
 /// The parts of a body above the plane of one of its faces, as triangles in the object frame.
@@ -14,8 +14,8 @@ pub struct Obstacles {
 }
 
 impl Obstacles {
-    /// What rises above a face. The face's neighbours across its outer edges begin at its plane: what is no higher than the
-    /// corners of its triangles are off the plane themselves, twice over, does not count.
+    /// Returns the parts that rise above a face. The face's neighbours across its outer edges begin at its plane: what
+    /// is no higher than the corners of its triangles are off the plane themselves, twice over, does not count.
     pub fn above(body: &Polyhedron, face: usize) -> Self {
         let shape = &body.faces[face];
         let height = |k: usize| shape.normal.dot(&body.vertices_m[k]) - shape.distance_m;
@@ -35,7 +35,7 @@ impl Obstacles {
         Self { triangles }
     }
 
-    /// Whether there are none.
+    /// Returns `true` if there are none.
     pub fn is_empty(&self) -> bool {
         self.triangles.is_empty()
     }

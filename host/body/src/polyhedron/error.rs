@@ -1,17 +1,17 @@
-//! What keeps a description from being a polyhedron.
+//! Errors in the description of a polyhedron.
 
 use super::{MAX_POINTS, MAX_TRIANGLES};
 use nalgebra::Vector3;
 
-/// Why a description is not a polyhedron.
+/// An error in the description of a polyhedron.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum PolyhedronError {
     /// A length that is not positive and finite.
     #[error("{what} has to be positive and finite, not {value:?}")]
     Length {
-        /// What it is the length of.
+        /// The length.
         what: &'static str,
-        /// What it is.
+        /// Its value.
         value: f64,
     },
     /// A coordinate that is NaN or infinite.
@@ -23,17 +23,17 @@ pub enum PolyhedronError {
     /// Too few points.
     #[error("{count} points make no {shape}: at least {least} are needed")]
     TooFewPoints {
-        /// How many there are.
+        /// Their number.
         count: usize,
-        /// How many it takes.
+        /// The number that it takes.
         least: usize,
-        /// What they should make.
+        /// The shape that they should make.
         shape: &'static str,
     },
     /// Too many points.
     #[error("{count} points are too many: at most {MAX_POINTS}")]
     TooManyPoints {
-        /// How many there are.
+        /// Their number.
         count: usize,
     },
     /// Two points in the same place.
@@ -62,7 +62,7 @@ pub enum PolyhedronError {
 }
 
 impl PolyhedronError {
-    /// What to do about it.
+    /// Returns the remedy.
     pub fn remedy(&self) -> &'static str {
         match self {
             Self::Mesh(fault) => fault.remedy(),
@@ -71,7 +71,7 @@ impl PolyhedronError {
     }
 }
 
-/// What is wrong with a mesh. Triangles and vertices are counted from 0 here and from 1 in words.
+/// A fault of a mesh. Triangles and vertices are counted from 0 here and from 1 in words.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum MeshFault {
     /// No triangles.
@@ -80,7 +80,7 @@ pub enum MeshFault {
     /// Too many triangles.
     #[error("{count} triangles are too many: at most {MAX_TRIANGLES}")]
     TooMany {
-        /// How many there are.
+        /// Their number.
         count: usize,
     },
     /// A coordinate that is NaN, or larger than a thousand kilometres.
@@ -94,7 +94,7 @@ pub enum MeshFault {
     Corners {
         /// The triangle.
         triangle: usize,
-        /// How many vertices there are.
+        /// Number of vertices.
         vertices: usize,
     },
     /// An edge of one triangle only.
@@ -103,7 +103,7 @@ pub enum MeshFault {
         counted(*.count, "open edge"), .triangle + 1, mm(&.ends_m[0]), mm(&.ends_m[1])
     )]
     Open {
-        /// How many there are.
+        /// Their number.
         count: usize,
         /// The triangle of the first.
         triangle: usize,
@@ -116,7 +116,7 @@ pub enum MeshFault {
         belong(*.count), .triangles[0] + 1, .triangles[1] + 1, .triangles[2] + 1, mm(&.ends_m[0]), mm(&.ends_m[1])
     )]
     Crowded {
-        /// How many there are.
+        /// Their number.
         count: usize,
         /// Three triangles of the first.
         triangles: [usize; 3],
@@ -126,7 +126,7 @@ pub enum MeshFault {
     /// More than one body.
     #[error("it is in {count} parts: triangle 1 belongs to one, triangle {} at {} mm to another", .triangle + 1, mm(.at_m))]
     Parts {
-        /// How many there are.
+        /// Their number.
         count: usize,
         /// The first triangle of the second.
         triangle: usize,
@@ -142,7 +142,7 @@ pub enum MeshFault {
     /// A surface like that of a Klein bottle.
     #[error("its surface has only one side: going around it, triangle {} comes back turned over", .triangle + 1)]
     OneSided {
-        /// Where that shows.
+        /// A triangle that shows it.
         triangle: usize,
     },
     /// The inside is outside.
@@ -154,7 +154,7 @@ pub enum MeshFault {
 }
 
 impl MeshFault {
-    /// What to do about it.
+    /// Returns the remedy.
     pub fn remedy(&self) -> &'static str {
         match self {
             Self::Empty => "export the body as a mesh of triangles",

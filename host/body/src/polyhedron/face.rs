@@ -34,7 +34,7 @@ impl Face {
         Self { normal, distance_m, corners, holes: Vec::new(), triangles, convex: true }
     }
 
-    /// Whether it has no holes and no corner that turns inwards.
+    /// Returns `true` if it has no holes and no corner that turns inwards.
     pub fn is_convex(&self) -> bool {
         self.convex
     }
@@ -132,7 +132,7 @@ fn distance_squared_from_segment(a: [f64; 2], b: [f64; 2]) -> f64 {
     }
 }
 
-/// Whether a simple loop turns left or goes straight on at each corner.
+/// Returns `true` if a simple loop turns left or goes straight on at each corner.
 fn is_convex(vertices_m: &[Vector3<f64>], normal: &Vector3<f64>, corners: &[usize]) -> bool {
     let count = corners.len();
     (0..count).all(|k| {

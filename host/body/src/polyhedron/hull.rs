@@ -45,7 +45,7 @@ pub(super) fn faces(points: &[Vector3<f64>]) -> Result<Hull, PolyhedronError> {
     Ok(renumber(points, loops))
 }
 
-/// Whether all points lie in one plane, nearly.
+/// Returns `true` if all points lie in one plane, nearly.
 fn is_flat(points: &[Vector3<f64>]) -> bool {
     let farthest = |distance: &dyn Fn(&Vector3<f64>) -> f64| {
         points.iter().max_by(|a, b| distance(a).total_cmp(&distance(b))).copied().unwrap_or_default()
@@ -126,7 +126,8 @@ fn outline(points: &[Vector3<f64>], members: u128, normal: &Vector3<f64>) -> Vec
     }
 }
 
-/// Whether every edge belongs to exactly two faces, which run along it in opposite directions, and Euler's formula holds.
+/// Returns `true` if every edge belongs to exactly two faces, which run along it in opposite directions, and Euler's
+/// formula holds.
 fn is_closed(loops: &[Vec<usize>]) -> bool {
     let mut edges: HashMap<(usize, usize), usize> = HashMap::new();
     for corners in loops {

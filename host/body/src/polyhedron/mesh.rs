@@ -73,7 +73,7 @@ pub fn bounds_m(points_m: &[Vector3<f64>]) -> (Vector3<f64>, Vector3<f64>) {
     points_m.iter().fold((start, start), |(low, high), point| (low.inf(point), high.sup(point)))
 }
 
-/// What can be said of single numbers.
+/// Checks single numbers.
 fn check(vertices_m: &[Vector3<f64>], triangles: &[[usize; 3]]) -> Result<(), MeshFault> {
     if triangles.len() > MAX_TRIANGLES {
         return Err(MeshFault::TooMany { count: triangles.len() });

@@ -14,7 +14,7 @@ use nalgebra::Vector3;
 /// An edge between two faces counts as straight when its vertices are this close to the line from end to end, in units of
 /// the distance that a face may be off its plane: both planes are off in the worst case.
 const STRAIGHT: f64 = 4.0;
-/// How often an edge that is not straight is cut in two. What is left after that keeps all of its vertices.
+/// Number of times that an edge that is not straight is cut in two. What is left after that keeps all of its vertices.
 const CUTS: usize = 12;
 
 /// Corners of the outer outline, counter-clockwise seen from outside, and of the holes.
@@ -101,8 +101,8 @@ impl Rims<'_> {
         loops
     }
 
-    /// Whether an edge goes on past the end of a half-edge of the rim: the same two faces on both sides, and nothing else
-    /// there, whichever of the two faces one asks.
+    /// Returns `true` if an edge goes on past the end of a half-edge of the rim: the same two faces on both sides, and
+    /// nothing else there, whichever of the two faces one asks.
     fn goes_on(&self, half: u32) -> bool {
         let after = self.after(half);
         self.face(self.twin(half)) == self.face(self.twin(after))
@@ -144,7 +144,7 @@ impl Rims<'_> {
     }
 }
 
-/// Which points of a line it takes to stay within a tolerance of all of them (Ramer, Douglas and Peucker).
+/// Returns the points of a line that stay within a tolerance of all of them (Ramer, Douglas and Peucker).
 fn bends(points: &[Vector3<f64>], tolerance_m: f64) -> Vec<bool> {
     let mut kept = vec![false; points.len()];
     let mut waiting = vec![(0, points.len() - 1, 0)];

@@ -1,4 +1,4 @@
-//! Which triangles of a mesh make up a face: everything that is flat to within a tolerance.
+//! Regions, the triangles of a mesh that make up a face: everything that is flat to within a tolerance.
 //!
 //! Neighbouring patches are united, beginning with single triangles, in the order of how well one plane fits both. The plane
 //! of a patch passes through its area's centre; its normal is the mean of its triangles' normals weighted with their areas,
@@ -21,7 +21,7 @@ use super::surface::{NONE, Survey, end, origin};
 use blindgrasp_shared::math::{Real, norm};
 use nalgebra::{Matrix3, Vector3};
 
-/// How well vertices are known, in units of the body's diagonal: some roundings of a 32-bit float.
+/// Accuracy of vertices, in units of the body's diagonal: some roundings of a 32-bit float.
 const VERTEX: f64 = 2e-6;
 /// The most that noise may tilt a triangle, rad: 45 degrees.
 const ROUGH: f64 = std::f64::consts::FRAC_PI_4;
@@ -89,16 +89,16 @@ impl Patch {
     }
 }
 
-/// When two patches are one.
+/// The limits within which two patches are one.
 struct Limits {
     angle: f64,
     mean_square: f64,
-    /// How well vertices are known, m.
+    /// Accuracy of vertices, m.
     vertex: f64,
 }
 
 impl Limits {
-    /// How badly one plane fits both, or `None` if it does not.
+    /// Returns how badly one plane fits both, or `None` if it does not.
     fn cost(&self, a: &Patch, b: &Patch) -> Option<f64> {
         // The length of a chord for the angle that it spans: the same to a hundredth up to half a radian.
         let tilt = norm(&(a.plane().0 - b.plane().0));
@@ -168,8 +168,8 @@ impl Sets {
     }
 }
 
-/// Which face each triangle belongs to, and the planes of the faces: outward unit normal, and distance from the origin, m.
-/// Faces are numbered in the order of their first triangles.
+/// The face that each triangle belongs to, and the planes of the faces: outward unit normal, and distance from the
+/// origin, m. Faces are numbered in the order of their first triangles.
 pub(super) struct Regions {
     pub(super) face_of: Vec<u32>,
     pub(super) planes: Vec<(Vector3<f64>, f64)>,
@@ -223,7 +223,7 @@ pub(super) fn regions(
     Regions { face_of, planes: patches.iter().map(Patch::plane).collect() }
 }
 
-/// What it takes to tell noise from what is round.
+/// The data that tell noise from what is round.
 struct Check<'a> {
     vertices_m: &'a [Vector3<f64>],
     triangles: &'a [[usize; 3]],
@@ -293,9 +293,9 @@ impl Bend {
         self.squares += bend * bend;
     }
 
-    /// Whether the patch bends from side to side by more than an angle, and not by chance. Of bends of one sign, the sum is
-    /// larger than the root of the sum of squares; with noise, what is added at one edge of a triangle is taken away at
-    /// the others, and it is much smaller.
+    /// Returns `true` if the patch bends from side to side by more than an angle, and not by chance. Of bends of one
+    /// sign, the sum is larger than the root of the sum of squares; with noise, what is added at one edge of a triangle
+    /// is taken away at the others, and it is much smaller.
     fn is_systematic(&self, area_m2: f64, angle_rad: f64) -> bool {
         let by_chance = self.edges >= MANY && self.sum * self.sum < 0.5 * self.squares;
         self.sum.abs() > angle_rad * area_m2.square_root() && !by_chance

@@ -1,4 +1,4 @@
-//! How the triangles of a mesh hang together: which edges they share, and whether they enclose a body.
+//! The surface of a mesh: which edges its triangles share, and whether they enclose a body.
 //!
 //! Half-edge `3 t + k` is the edge of triangle `t` that runs from its corner `k` to the next. Everything is found by sorting
 //! half-edges, in `n log n`.
@@ -9,7 +9,7 @@ use nalgebra::Vector3;
 /// No half-edge.
 pub const NONE: u32 = u32::MAX;
 
-/// What the edges of a mesh are like.
+/// The edges of a mesh.
 #[derive(Clone, Debug, Default)]
 pub struct Survey {
     /// For each half-edge the one on the other side of the same edge, whichever way it runs; [`NONE`] where that is not
@@ -21,12 +21,12 @@ pub struct Survey {
     pub crowded: Vec<[u32; 3]>,
 }
 
-/// Where a half-edge begins.
+/// Returns the vertex where a half-edge begins.
 pub fn origin(triangles: &[[usize; 3]], half: u32) -> usize {
     triangles[half as usize / 3][half as usize % 3]
 }
 
-/// Where a half-edge ends.
+/// Returns the vertex where a half-edge ends.
 pub fn end(triangles: &[[usize; 3]], half: u32) -> usize {
     origin(triangles, next(half))
 }
@@ -87,7 +87,7 @@ impl Survey {
         firsts
     }
 
-    /// Whether the triangles make one closed surface.
+    /// Checks that the triangles make one closed surface.
     pub fn check_closed(
         &self,
         vertices_m: &[Vector3<f64>],
@@ -116,7 +116,7 @@ impl Survey {
         }
     }
 
-    /// Whether neighbours run along their common edge in opposite directions, everywhere.
+    /// Checks that neighbours run along their common edge in opposite directions, everywhere.
     pub(crate) fn check_oriented(&self, triangles: &[[usize; 3]]) -> Result<(), MeshFault> {
         for (half, &twin) in self.twins.iter().enumerate() {
             if twin != NONE && origin(triangles, half as u32) == origin(triangles, twin) {

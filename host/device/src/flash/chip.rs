@@ -1,4 +1,4 @@
-//! What probe-rs knows of a chip.
+//! Chips, as probe-rs knows them.
 
 use crate::image::{Firmware, FitError, Footprint, Memory};
 use probe_rs::config::{FlashProperties, MemoryRegion, Registry, RegistryError, SectorDescription};
@@ -6,7 +6,7 @@ use probe_rs::flashing::{FlashError, FlashLoader};
 use probe_rs::{Architecture, Target};
 use std::ops::Range;
 
-/// How many names are suggested in place of an unknown one.
+/// Most names that are suggested in place of an unknown one.
 const SUGGESTIONS: usize = 8;
 
 /// A chip that probe-rs can flash.
@@ -16,15 +16,15 @@ pub struct Chip {
     memory: Memory,
 }
 
-/// Why a chip is not to be flashed, or not with this image.
+/// The reason for which a chip is not to be flashed, or not with this image.
 #[derive(Debug, thiserror::Error)]
 pub enum ChipError {
     /// probe-rs knows no such chip.
     #[error("no chip is called `{name}`{}", suggestion(.similar))]
     Unknown {
-        /// What was asked for.
+        /// The name that was asked for.
         name: String,
-        /// What may be meant.
+        /// Similar names.
         similar: Vec<String>,
     },
     /// Its description cannot be read.
@@ -42,9 +42,9 @@ pub enum ChipError {
     /// probe-rs would not write a part of the image.
     #[error("what the image holds at {address:#010x} cannot be flashed")]
     Refused {
-        /// Where.
+        /// The address.
         address: u64,
-        /// Why.
+        /// The cause.
         source: FlashError,
     },
 }

@@ -4,13 +4,13 @@ use defmt_decoder::{DecodeError, Locations, StreamDecoder, Table};
 use std::fmt;
 use std::path::Path;
 
-/// What is needed to decode the logs of one build.
+/// The tables that decode the logs of one build.
 pub struct Logs {
     table: Table,
     locations: Locations,
 }
 
-/// Why the logs of an image cannot be decoded.
+/// The reason for which the logs of an image cannot be decoded.
 #[derive(Debug, thiserror::Error)]
 pub enum LogsError {
     /// There are none.
@@ -30,7 +30,7 @@ pub struct Line {
     pub level: Option<&'static str>,
     /// File and line of the source.
     pub location: Option<String>,
-    /// What it says.
+    /// The message.
     pub message: String,
 }
 

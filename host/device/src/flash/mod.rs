@@ -16,18 +16,18 @@ use probe_rs::flashing::{DownloadOptions, FlashProgress, ProgressEvent, Progress
 
 pub use chip::{Chip, ChipError};
 
-/// What is being done to the flash.
+/// A phase of flashing.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Phase {
     /// Sectors are erased.
     Erase,
     /// Pages are written.
     Program,
-    /// What was written is compared with the image.
+    /// The contents of the flash are compared with the image.
     Verify,
 }
 
-/// How far it is.
+/// The progress of a phase.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Progress {
     /// With what.
@@ -38,13 +38,13 @@ pub struct Progress {
     pub total_bytes: u64,
 }
 
-/// Why an image could not be written to flash.
+/// The reason for which an image could not be written to flash.
 #[derive(Debug, thiserror::Error)]
 pub enum DownloadError {
     /// The image does not fit after all.
     #[error(transparent)]
     Chip(#[from] ChipError),
-    /// What is in flash afterwards is not the image.
+    /// The flash does not hold the image afterwards.
     #[error(
         "the flash does not hold the image after writing it: the supply may sag or the flash be worn out; flash again, slower wiring and a shorter cable help"
     )]

@@ -9,9 +9,9 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread;
 use std::time::{Duration, Instant};
 
-/// How long the firmware may take from its start to its first logs.
+/// Longest time from the firmware's start to its first logs.
 const START_TIMEOUT: Duration = Duration::from_secs(3);
-/// How long halting it may take.
+/// Longest time that halting may take.
 const HALT_TIMEOUT: Duration = Duration::from_millis(500);
 /// Between two looks at an empty buffer.
 const IDLE: Duration = Duration::from_millis(10);
@@ -31,7 +31,7 @@ pub enum Event {
     Note(String),
 }
 
-/// Why there is nothing to follow.
+/// The reason for which there is nothing to follow.
 #[derive(Debug, thiserror::Error)]
 pub enum MonitorError {
     /// The firmware cannot be started.
@@ -43,9 +43,9 @@ pub enum MonitorError {
         first log, or was it built with another memory.x?", START_TIMEOUT.as_secs()
     )]
     NoControlBlock {
-        /// Where it should be.
+        /// The address where it should be.
         address: u64,
-        /// What the core does.
+        /// The state of the core.
         status: String,
     },
     /// The connection broke before anything was seen.
@@ -117,7 +117,7 @@ pub fn follow(
     Ok(())
 }
 
-/// Why reading stops.
+/// The reason for which reading stops.
 enum Break {
     /// The probe or the chip is gone.
     Lost(rtt::Error),
@@ -250,7 +250,7 @@ impl<S: FnMut(Event) -> io::Result<()>> Reader<'_, S> {
     }
 }
 
-/// Whether memory could not be read, in contrast to holding what it should not.
+/// Returns `true` if memory could not be read, in contrast to holding what it should not.
 fn is_access(error: &rtt::Error) -> bool {
     matches!(error, rtt::Error::Probe(_) | rtt::Error::MemoryRead(_) | rtt::Error::Other(_))
 }

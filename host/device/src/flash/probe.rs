@@ -8,13 +8,13 @@ use probe_rs::{Core, MemoryInterface, Permissions, Session};
 use std::fmt::Write as _;
 use std::time::Duration;
 
-/// How long halting may take.
+/// Longest time that halting may take.
 const HALT_TIMEOUT: Duration = Duration::from_millis(500);
 
-/// Why there is no session.
+/// The reason for which there is no session.
 #[derive(Debug, thiserror::Error)]
 pub enum ProbeError {
-    /// What was asked for is no selector.
+    /// The text that was asked for is no selector.
     #[error(
         "`{0}` does not select a probe; write VID:PID or VID:PID:SERIAL in hexadecimal, such as 0483:374b"
     )]
@@ -28,9 +28,9 @@ pub enum ProbeError {
     /// Probes are connected, but not that one.
     #[error("no debug probe is `{selector}`; connected are: {}", .connected.join("; "))]
     NoSuchProbe {
-        /// What was asked for.
+        /// The text that was asked for.
         selector: String,
-        /// What there is.
+        /// The probes that are connected.
         connected: Vec<String>,
     },
     /// There is more than one.
@@ -45,9 +45,9 @@ pub enum ProbeError {
     /// It does not open.
     #[error("the debug probe {probe} cannot be opened; is another program using it?")]
     Open {
-        /// Which.
+        /// The probe.
         probe: String,
-        /// Why.
+        /// The cause.
         source: DebugProbeError,
     },
     /// The chip does not answer as it should.
@@ -56,15 +56,15 @@ pub enum ProbeError {
         (under reset: {under_reset})"
     )]
     Attach {
-        /// Which probe.
+        /// The probe.
         probe: String,
-        /// Which chip.
+        /// The chip.
         chip: String,
-        /// What the probe measures of its supply.
+        /// The supply voltage that the probe measures.
         voltage: String,
-        /// What happened in the second try, with reset held.
+        /// The error of the second try, with reset held.
         under_reset: String,
-        /// What happened in the first.
+        /// The error of the first.
         source: Box<probe_rs::Error>,
     },
     /// Another chip answers.
@@ -72,9 +72,9 @@ pub enum ProbeError {
         "the connected chip is {found}; nothing was erased; check --chip, which is {chip}, and which board is connected"
     )]
     OtherChip {
-        /// What it should be.
+        /// The chip that it should be.
         chip: String,
-        /// What it is.
+        /// The chip that it is.
         found: String,
     },
     /// Its option bytes may be laid out in another way.
@@ -194,7 +194,8 @@ fn device(idcode: u32) -> u32 {
     }
 }
 
-/// Why a connected chip is not the one that is meant; nothing if it may be. `expected` is what the image says of it.
+/// Returns the contradiction between a connected chip and the one that is meant; nothing if it may be. `expected` is
+/// what the image says of it.
 ///
 /// `idcode` is the word at DBGMCU_IDCODE, `flash_kib` the half-word that tells the size of the flash.
 pub fn contradiction(expected: Option<u32>, flash_bytes: u64, idcode: u32, flash_kib: u16) -> Option<String> {
@@ -243,7 +244,7 @@ pub fn with_options<T>(
     Ok(act(&mut Halted(&mut core))?)
 }
 
-/// Whether it has the two registers that are looked at where those of an STM32F4 are.
+/// Returns `true` if it has the two registers that are looked at where those of an STM32F4 are.
 fn has_idcode(chip: &Chip) -> bool {
     chip.name().to_ascii_uppercase().starts_with("STM32F4")
 }

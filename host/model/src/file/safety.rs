@@ -17,9 +17,9 @@ pub struct SafetyKey {
     pub most: f64,
     /// The parameters of the controller that follow from it.
     pub parameters: &'static [Parameter],
-    /// What it is and protects from.
+    /// Its meaning, and the harm that it protects from.
     pub what: &'static str,
-    /// How it is chosen.
+    /// The way to choose it.
     pub choice: &'static str,
 }
 

@@ -8,7 +8,7 @@ use std::fmt;
 /// As many findings of a kind are told one by one.
 const LARGEST_GROUP_TOLD: usize = 3;
 
-/// How bad a finding is. The worst comes first in order.
+/// The severity of a finding. The worst comes first in order.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, serde::Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Severity {
@@ -42,17 +42,17 @@ impl fmt::Display for Severity {
 /// In JSON: `severity`, `subject`, `key`, `file`, `line` (the last two `null` where unknown), `what`, `remedy`.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Finding {
-    /// How bad it is.
+    /// Its severity.
     pub severity: Severity,
-    /// What it is about, such as ``joint `finger-1-flex-2` ``; empty for the file as a whole.
+    /// The subject, such as ``joint `finger-1-flex-2` ``; empty for the file as a whole.
     pub subject: String,
     /// The key in the file, as `--set` takes it, such as `joint.3.axis`; empty where there is none.
     pub key: String,
     /// File and line, where known.
     pub place: Option<Place>,
-    /// What is wrong.
+    /// The fault.
     pub what: String,
-    /// What to do; may be empty.
+    /// The remedy; may be empty.
     pub remedy: String,
 }
 
@@ -117,7 +117,7 @@ impl Finding {
         one_line(&line)
     }
 
-    /// What is wrong without names and numbers: the same for findings of a kind.
+    /// Returns the fault without names and numbers: the same for findings of a kind.
     fn kind(&self) -> String {
         let quoted = self.what.split('`').step_by(2);
         let words = quoted.flat_map(|part| part.split([' ', ',', '[', ']', '(', ')']));
@@ -140,7 +140,7 @@ impl Serialize for Finding {
     }
 }
 
-/// What follows from the findings.
+/// The verdict that follows from the findings.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Verdict {
@@ -163,7 +163,7 @@ impl Verdict {
     }
 }
 
-/// How many findings there are of each severity.
+/// The number of findings of each severity.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
 pub struct Counts {
     /// Errors.
@@ -227,7 +227,7 @@ impl Findings {
         lines
     }
 
-    /// How many there are of each severity.
+    /// Returns the number of findings of each severity.
     pub fn counts(&self) -> Counts {
         let count = |severity| self.iter().filter(|finding| finding.severity == severity).count();
         Counts {
@@ -237,7 +237,7 @@ impl Findings {
         }
     }
 
-    /// What follows.
+    /// Returns the verdict that follows.
     pub fn verdict(&self) -> Verdict {
         match self.iter().map(|finding| finding.severity).min() {
             Some(Severity::Error) => Verdict::Broken,

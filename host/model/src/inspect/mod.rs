@@ -1,4 +1,4 @@
-//! What is this file, is it usable, and what is wrong with it: the checks of `blindgrasp hand check` and `object check`.
+//! Checks of a file, for `blindgrasp hand check` and `object check`.
 //!
 //! Loading stops at the first thing that keeps a file from being used. A check reads on, says everything that it finds, also
 //! what can be used but is likely a mistake, and how sure that is:

@@ -1,4 +1,4 @@
-//! What is read at most. Everything is counted before room is made for it.
+//! The most that is read. Everything is counted before room is made for it.
 
 pub(super) use blindgrasp_body::polyhedron::MAX_TRIANGLES;
 
@@ -11,5 +11,5 @@ pub(super) const MAX_CORNERS: usize = 1000;
 /// Looks from a corner of a polygon at another while the polygons of a file are cut into triangles. A usual polygon takes the
 /// square of its corners, one that winds up to the cube; this takes half a second.
 pub(super) const MOST_LOOKS: u64 = 100_000_000;
-/// What to do about a file with too much in it.
+/// The remedy for a file with too much in it.
 pub(super) const COARSER: &str = "export it with coarser tolerances: a grasp needs its faces, not its finish";

@@ -63,10 +63,10 @@ const SCALES: [f64; 2] = [1e-6, 1e6];
 /// No body has a vertex farther than this from the origin, m.
 const FARTHEST_M: f64 = 1e6;
 
-/// What is quoted of a file in an error, characters.
+/// The most that is quoted of a file in an error, characters.
 const LONGEST_EXCERPT: usize = 60;
 
-/// What to do about what was repaired.
+/// The remedy for what was repaired.
 const REPAIRED: &str = "it is used as repaired";
 
 /// Puts vertices and triangles in the place of the mesh file that an object names, if it does; notices say what was repaired.
@@ -175,7 +175,7 @@ fn excerpt(text: &str) -> String {
     }
 }
 
-/// Whether a name is that of a mesh file.
+/// Returns `true` if a name is that of a mesh file.
 pub fn is_mesh(name: &str) -> bool {
     ending(name).is_some_and(|ending| ending == "stl" || ending == "obj")
 }

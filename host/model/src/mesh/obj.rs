@@ -103,7 +103,7 @@ fn joined(mut bytes: Vec<u8>) -> Vec<u8> {
     bytes
 }
 
-/// Whether a line describes a vertex, or a face.
+/// Returns `v` or `f` for a line that describes a vertex or a face.
 fn kind(line: &[u8]) -> Option<u8> {
     match line.trim_ascii_start() {
         [kind @ (b'v' | b'f'), next, ..] if next.is_ascii_whitespace() => Some(*kind),

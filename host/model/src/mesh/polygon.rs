@@ -50,7 +50,8 @@ fn project(corners: &[Vector3<f64>]) -> Vec<[f64; 2]> {
     corners.iter().map(|corner| corner - first).map(|corner| [x.dot(&corner), y.dot(&corner)]).collect()
 }
 
-/// Whether corner `k` of what is left turns left, and no other corner lies in the triangle that it makes with its neighbours.
+/// Returns `true` if corner `k` of what is left turns left, and no other corner lies in the triangle that it makes with
+/// its neighbours.
 fn is_ear(plane: &[[f64; 2]], left: &[usize], k: usize) -> bool {
     let count = left.len();
     let [a, b, c] = [k + count - 1, k, k + 1].map(|k| plane[left[k % count]]);

@@ -19,7 +19,7 @@ pub(super) struct Mesh {
     pub(super) numbers: Vec<u32>,
 }
 
-/// What comes out.
+/// The repaired surface.
 #[derive(Debug)]
 pub(super) struct Repaired {
     pub(super) vertices: Vec<Vector3<f64>>,
@@ -138,7 +138,7 @@ impl Mesh {
     }
 }
 
-/// Which triangles are to be turned over so that all agree with the first.
+/// Returns the triangles that are to be turned over so that all agree with the first.
 fn turns(triangles: &[[usize; 3]], edges: &Survey) -> Result<Vec<bool>, MeshFault> {
     let mut turns: Vec<Option<bool>> = vec![None; triangles.len()];
     turns[0] = Some(false);

@@ -2,7 +2,7 @@
 
 use nalgebra::Vector3;
 
-/// What is wrong with a file, and what to do.
+/// A fault of a file, and the remedy.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct Problem {
     pub(super) what: String,

@@ -98,7 +98,7 @@ fn ascii(text: &[u8]) -> Result<Soup, Problem> {
     gather(clean, lines_of.len(), |triangle| lines_of.get(triangle).copied())
 }
 
-/// Whether a word is a number that a binary file could hold.
+/// Returns `true` if a word is a number that a binary file could hold.
 fn is_finite(word: &str) -> bool {
     word.parse::<f32>().is_ok_and(f32::is_finite)
 }

@@ -50,7 +50,7 @@ fn wavefront((vertices, triangles): &Mesh) -> Vec<u8> {
     text.into_bytes()
 }
 
-/// What a file of this name and content becomes.
+/// Reads a file of this name and content.
 fn read(name: &str, bytes: &[u8]) -> std::result::Result<Repaired, Problem> {
     let soup = if name.ends_with("stl") { stl::read(bytes.to_vec()) } else { obj::read(bytes.to_vec()) };
     body(soup?, Unit::Millimetre, 1.0)

@@ -44,7 +44,7 @@ impl Unit {
         }
     }
 
-    /// How large something is in each unit, for whoever has to choose one.
+    /// Returns the size of something in each unit, for whoever has to choose one.
     pub(super) fn choices(size: &Vector3<f64>, how: impl Fn(&str) -> String) -> String {
         let choices = Self::ALL.map(|unit| {
             let [x, y, z] = [size.x, size.y, size.z].map(|length| short(unit.metres(length) * 1e3));

@@ -1,4 +1,4 @@
-//! Which corners of triangles are the same vertex.
+//! Welding of the triangles' corners that are the same vertex.
 
 use nalgebra::Vector3;
 use std::collections::HashMap;

@@ -94,7 +94,8 @@ fn safety_numbers_come_from_the_file() {
     }
 }
 
-/// What a person who wires a hand finds out, joint by joint, is what its firmware is built with.
+/// The signs, zeros and scales that a person who wires a hand finds out, joint by joint, are what its firmware is built
+/// with.
 #[test]
 fn signs_zeros_and_scales_come_from_the_file() {
     let defaults = "[joint_defaults]\nencoder_zero_count = -7\ntorque_per_volt_nm_v = 0.25";
@@ -143,7 +144,7 @@ fn safety_numbers_act_in_a_scene_and_are_written_out() {
     assert_eq!(Scene::parse(&text, "again", Path::new(""), &[]).unwrap(), slower);
 }
 
-/// What a firmware is built with: the earlier law, if the hand's file asks for it.
+/// A firmware is built with everything that the hand's file has: the earlier law, if the hand's file asks for it.
 #[test]
 fn a_hand_can_have_the_earlier_law() {
     let text = hand_text().replacen(

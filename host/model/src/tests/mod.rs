@@ -66,7 +66,7 @@ fn assert_touches(scene: &Scene) {
     }
 }
 
-/// What is odd about a shipped scene, and is meant to be.
+/// Returns the warnings on a shipped scene that are meant to be.
 fn known_warnings(name: &str) -> &'static [&'static str] {
     match name {
         "hand-arm" | "hand-arm-normal-only" => &[

@@ -36,7 +36,7 @@ pub(super) struct Moving {
     pub(super) joint: usize,
     /// Index among the hand's joints; none on the base.
     pub(super) parent: Option<usize>,
-    /// Where its link frame is in the parent's at zero angle, m.
+    /// Position of its link frame in the parent's at zero angle, m.
     pub(super) offset_m: [f64; 3],
     /// Roll, pitch and yaw of the same, rad.
     pub(super) rpy_rad: [f64; 3],
@@ -44,7 +44,7 @@ pub(super) struct Moving {
     pub(super) body: Body,
 }
 
-/// Where a link is.
+/// The pose of a link.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Seat {
     /// Index among the hand's joints; none on the base.
@@ -213,7 +213,7 @@ fn held(robot: &Robot, keys: &Keys) -> Result<BTreeMap<usize, f64>> {
     Ok(held)
 }
 
-/// Where a joint can be, rad or m; anywhere, if it does not say.
+/// Returns the range of a joint, rad or m; anywhere, if it does not say.
 fn range(joint: &Joint) -> (f64, f64) {
     match (joint.kind, joint.limit.lower, joint.limit.upper) {
         (Kind::Continuous, ..) | (_, None, None) => (f64::NEG_INFINITY, f64::INFINITY),
@@ -222,7 +222,7 @@ fn range(joint: &Joint) -> (f64, f64) {
     }
 }
 
-/// How far a joint that is held still has moved.
+/// Returns the motion of a joint that is held still.
 fn motion(joint: &Joint, position: Option<f64>) -> Transform {
     let position = position.unwrap_or_else(|| resting(joint));
     let still = Transform::identity();
@@ -298,7 +298,7 @@ fn subject(joints: &[&Joint]) -> (String, &'static str) {
     }
 }
 
-/// How to hold joints still.
+/// Returns the advice to hold joints still.
 fn hold(joints: &[&Joint], list: &str) -> String {
     let it = if joints.len() == 1 { "it" } else { "them" };
     let entries: Vec<String> = joints
@@ -311,7 +311,7 @@ fn hold(joints: &[&Joint], list: &str) -> String {
     )
 }
 
-/// Where a joint is held of which it is not said: at zero, or the limit nearest to it.
+/// Returns the position at which a joint is held of which it is not said: at zero, or the limit nearest to it.
 pub(super) fn resting(joint: &Joint) -> f64 {
     let (lower, upper) = range(joint);
     0.0_f64.max(lower).min(upper)

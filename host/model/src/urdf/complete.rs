@@ -1,4 +1,4 @@
-//! What the URDF knows of a joint, as keys of its entry.
+//! The URDF's knowledge of a joint, as keys of its entry.
 //!
 //! A key comes from the joint's own `[[joint]]`, else from the URDF, else from `[joint_defaults]`.
 
@@ -14,7 +14,7 @@ use std::f64::consts::PI;
 /// Torques, N m, and speeds, rad/s, from which on a limit is taken for a placeholder.
 pub(super) const PLACEHOLDER: f64 = 1000.0;
 
-/// What is odd with the joints: many have the same, which is told of the first.
+/// Oddities of the joints: many have the same, which is told of the first.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Oddities(Vec<(&'static str, Notice, usize)>);
 

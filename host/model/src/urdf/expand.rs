@@ -64,7 +64,7 @@ pub(crate) fn expand(hand: &mut Node, home: &Home, notices: &mut Vec<Notice>) ->
     hand_parts.add_joints(hand, notices)
 }
 
-/// What the entries are made of.
+/// The parts of the entries.
 pub(super) struct Parts<'a> {
     pub(super) robot: &'a Robot,
     pub(super) assembly: &'a Assembly,

@@ -165,7 +165,7 @@ impl<'a> Export<'a> {
         self.line(1, "</joint>".into());
     }
 
-    /// Where the bones of a link end: at the joints and fingertips that sit on it.
+    /// Returns the ends of the bones of a link: at the joints and fingertips that sit on it.
     fn bones(&self, link: Option<&str>) -> Vec<Vector3<f64>> {
         let joints = self.hand.joints.iter().filter(|joint| joint.parent.as_deref() == link);
         let tips = self.hand.fingertips.iter().filter(|tip| Some(tip.link.as_str()) == link);

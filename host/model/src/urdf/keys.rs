@@ -5,7 +5,7 @@ use super::super::error::suggestion;
 use serde::Deserialize;
 use std::collections::BTreeMap;
 
-/// What a hand's file says of its URDF.
+/// The keys of a hand's file on its URDF.
 #[derive(Clone, Debug, Default, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct Keys {
@@ -25,7 +25,7 @@ pub(crate) struct Keys {
     pub(crate) ignore: Vec<String>,
 }
 
-/// What can be ignored.
+/// The values that can be ignored.
 const IGNORABLE: [&str; 4] = ["effort", "velocity", "damping", "friction"];
 
 impl Keys {
@@ -34,7 +34,7 @@ impl Keys {
         number.filter(|_| self.ignore.iter().all(|ignored| ignored != attribute))
     }
 
-    /// Whether everything that is to be ignored can be.
+    /// Checks that everything that is to be ignored can be.
     pub(super) fn check(&self) -> Result<()> {
         match self.ignore.iter().position(|word| !IGNORABLE.contains(&word.as_str())) {
             None => Ok(()),

@@ -10,13 +10,13 @@ use roxmltree::Node;
 
 /// Links, or joints. Humanoids with both hands have less than 200.
 const MOST_PARTS: usize = 2000;
-/// How far an axis may be from a unit vector: files with three decimals are that far off.
+/// Largest difference of an axis from a unit vector: files with three decimals are that far off.
 const AXIS_SLACK: f64 = 1e-3;
 
 /// Shorter ones have no direction that was meant.
 const SHORTEST_AXIS: f64 = 1e-4;
 
-/// How far the square of a product of inertia may be above the product of its moments, relatively: rounded digits.
+/// Largest excess of the square of a product of inertia over the product of its moments, relatively: rounded digits.
 const PRODUCT_SLACK: f64 = 1e-4;
 
 impl Robot {
@@ -95,7 +95,7 @@ fn version(root: Node<'_, '_>) -> (u32, u32) {
 
 struct Reader<'a> {
     text: Text<'a>,
-    /// Whether the version of URDF has quaternions.
+    /// `true` if the version of URDF has quaternions.
     quaternions: bool,
 }
 

@@ -21,16 +21,16 @@ pub(super) struct Link {
     pub(super) place: Place,
     /// Its own mass, in its frame; what is wrong with it matters only if it moves.
     pub(super) body: Result<Body, SceneError>,
-    /// Where that is written.
+    /// The place where that is written.
     pub(super) body_place: Place,
-    /// What it looks like, as far as no mesh is needed to know.
+    /// Its shapes, as far as no mesh is needed to know them.
     pub(super) shapes: Vec<Shape>,
 }
 
 /// A sphere, box, cylinder or capsule of a link.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Shape {
-    /// What it is.
+    /// Its name.
     pub(super) word: &'static str,
     /// Its middle in the link's frame, m.
     pub(super) centre_m: Vector3<f64>,
@@ -58,7 +58,7 @@ pub(super) struct Joint {
     pub(super) mimics: Option<String>,
 }
 
-/// How a joint moves.
+/// The kind of a joint's motion.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Kind {
     Fixed,
@@ -91,7 +91,7 @@ impl Kind {
     }
 }
 
-/// Where a frame is in its parent's.
+/// The pose of a frame in its parent's.
 #[derive(Clone, Debug)]
 pub(super) struct Origin {
     pub(super) transform: Transform,
@@ -129,7 +129,7 @@ impl Robot {
         self.links.iter().position(|link| link.name == name)
     }
 
-    /// What to do about a link that is not there.
+    /// Returns the remedy for a link that is not there.
     pub(super) fn link_suggestion(&self, name: &str) -> String {
         suggestion(name, self.links.iter().map(|link| link.name.as_str()))
     }

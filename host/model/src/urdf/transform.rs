@@ -1,4 +1,4 @@
-//! Where one frame is in another, and its angles.
+//! The pose of one frame in another, and its angles.
 
 use super::super::hand::rotation;
 use nalgebra::{Matrix3, Vector3};

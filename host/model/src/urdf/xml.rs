@@ -14,11 +14,11 @@ const MOST_NODES: u32 = 200_000;
 const MOST_ATTRIBUTES: usize = 100;
 /// Declarations of namespaces in a file.
 const MOST_NAMESPACES: usize = 200;
-/// What is quoted of a value in an error, characters.
+/// The most that is quoted of a value in an error, characters.
 const LONGEST_QUOTE: usize = 60;
 
 const IS_XACRO: &str = "is a xacro file, not a URDF";
-/// What to do about that.
+/// The remedy for that.
 const EXPAND: &str = "expand it first: `xacro in.xacro > out.urdf`";
 
 /// A text with its lines.
@@ -95,7 +95,7 @@ impl<'a> Text<'a> {
         self.lines.place(element.range().start)
     }
 
-    /// Whether an element belongs to xacro.
+    /// Refuses an element that belongs to xacro.
     pub(super) fn refuse_xacro(&self, element: Node<'_, '_>) -> Result<(), SceneError> {
         let in_xacro = |namespace: &str| namespace.contains("xacro");
         if element.tag_name().namespace().is_some_and(in_xacro) {
@@ -179,7 +179,8 @@ pub(super) fn quote(text: &str) -> String {
     }
 }
 
-/// Where a tag has too many attributes. Only what looks like a tag is looked at: quoted text and comments are passed over.
+/// Returns the place of a tag with too many attributes. Only what looks like a tag is looked at: quoted text and
+/// comments are passed over.
 fn crowded_tag(text: &str) -> Option<usize> {
     let bytes = text.as_bytes();
     let mut at = 0;

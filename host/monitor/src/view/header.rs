@@ -9,7 +9,7 @@ use ratatui::style::{Modifier, Style};
 use ratatui::text::{Line, Span};
 use std::time::Duration;
 
-/// How long what happened stays in the header.
+/// Time for which an event stays in the header.
 const STAYS: Duration = Duration::from_secs(10);
 /// Without a record for so long, what is shown is said to be old.
 const OLD: Duration = Duration::from_millis(500);
@@ -110,7 +110,7 @@ fn wrong<'a>(model: &'a Model, screen: &Screen<'a>, width: usize) -> Line<'a> {
     fit(parts, width)
 }
 
-/// What was answered or happened lately, the newest first.
+/// Returns the latest answers and events, the newest first.
 fn latest<'a>(model: &'a Model, screen: &Screen<'a>, now: Duration, width: usize) -> Line<'a> {
     let palette = screen.palette;
     let recent = model.notices().take_while(|notice| now.saturating_sub(notice.at) < STAYS);
@@ -121,7 +121,7 @@ fn latest<'a>(model: &'a Model, screen: &Screen<'a>, now: Duration, width: usize
     fit(parts.collect(), width)
 }
 
-/// How much comes, and what is lost.
+/// Returns the line on the link's load and losses.
 fn link<'a>(model: &'a Model, screen: &Screen<'a>, now: Duration, width: usize) -> Line<'a> {
     let palette = screen.palette;
     let Some(record) = model.record() else { return Line::default() };
@@ -151,7 +151,7 @@ fn link<'a>(model: &'a Model, screen: &Screen<'a>, now: Duration, width: usize) 
     fit(parts, width)
 }
 
-/// Who it is, and where.
+/// Returns the line on the hand's identity and port.
 fn identity<'a>(model: &'a Model, screen: &Screen<'a>, width: usize) -> Line<'a> {
     let palette = screen.palette;
     let mut parts = match screen.source {

@@ -5,14 +5,14 @@ use super::{Screen, cut, fixed};
 use blindgrasp_shared::limit::Limiting;
 use ratatui::text::{Line, Span};
 
-/// Where rows also tell the ends of ranges and the limits.
+/// Width from which on rows also tell the ends of ranges and the limits.
 const WIDE: usize = 104;
 /// Columns of a number.
 const NUMBER: usize = 8;
 /// Least columns of what limits.
 const LIMITS: usize = 12;
 
-/// How the columns of a row are shared out.
+/// The widths of the columns of a row.
 struct Columns {
     name: usize,
     bar: usize,
@@ -110,7 +110,7 @@ fn row<'a>(
     Line::from(spans)
 }
 
-/// What limits, in as many words as there is room for; nothing where nothing does.
+/// Returns the limit that acts, in as many words as there is room for; nothing where nothing does.
 fn limited_by(limiting: Limiting, width: usize) -> String {
     if limiting.is_empty() {
         return String::new();
@@ -122,7 +122,7 @@ fn limited_by(limiting: Limiting, width: usize) -> String {
     cut(&words.replace(" limit", "").replace(" end", ""), width)
 }
 
-/// Where an angle is between the ends; whether it is beyond one. A `!` stands where it is.
+/// Returns the bar of an angle between the ends, and `true` if it is beyond one. A `!` stands where it is.
 fn angle_bar(angle_rad: Option<f32>, range_rad: Option<(f32, f32)>, width: usize) -> (String, bool) {
     let (Some(angle), Some((lower, upper))) = (angle_rad, range_rad) else {
         return (" ".repeat(width), false);

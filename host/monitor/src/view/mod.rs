@@ -27,37 +27,37 @@ const JOINT_ROWS: u16 = 5;
 /// Most rows of the list of what happened.
 const NOTICE_ROWS: u16 = 8;
 
-/// Where what is shown comes from.
+/// The source of the view.
 #[derive(Clone, Copy, Debug)]
 pub enum Source<'s> {
     /// A line.
     Port {
         /// Its name.
         port: &'s str,
-        /// What was recorded so far, in words, if there is a recording.
+        /// The words on the recording so far, if there is one.
         saved: Option<&'s str>,
     },
     /// A recording.
     Recording {
         /// Its name.
         file: &'s str,
-        /// Which of its devices.
+        /// The device of the recording.
         device: &'s str,
-        /// How long it is.
+        /// Its length.
         length: Duration,
-        /// How much faster than it was it is played.
+        /// The speed of playing, as a multiple of the recording's.
         speed: f64,
-        /// Whether it waits.
+        /// `true` if it waits.
         is_paused: bool,
-        /// Whether it is on its way to where it was told to go.
+        /// `true` if it is on its way to where it was told to go.
         is_seeking: bool,
     },
 }
 
-/// What the user has chosen to see.
+/// The choices of the user.
 #[derive(Clone, Copy, Debug)]
 pub struct Screen<'s> {
-    /// Where it comes from.
+    /// The source of the view.
     pub source: Source<'s>,
     /// The plot.
     pub plot: Plot,
@@ -65,9 +65,9 @@ pub struct Screen<'s> {
     pub window_s: u64,
     /// The joint; `None` for all.
     pub joint: Option<usize>,
-    /// Whether the keys are explained.
+    /// `true` if the keys are explained.
     pub help: bool,
-    /// What is asked, and how long it waits for an answer, s.
+    /// The question, and how long it waits for an answer, s.
     pub question: Option<(&'s str, u64)>,
     /// Colours.
     pub palette: Palette,

@@ -1,4 +1,4 @@
-//! What colours say, which words and signs say as well.
+//! Colours, whose meanings words and signs have as well.
 
 use super::super::model::Level;
 use blindgrasp_shared::supervisor::Mode;
@@ -7,7 +7,7 @@ use ratatui::style::{Color, Modifier, Style};
 /// Styles, with colours of the sixteen that every terminal has, or without.
 #[derive(Clone, Copy, Debug)]
 pub struct Palette {
-    /// Whether there are colours.
+    /// `true` if there are colours.
     pub coloured: bool,
 }
 

@@ -13,7 +13,7 @@ use std::time::Duration;
 /// Dots of a braille character side by side.
 const DOTS: usize = 2;
 
-/// What a few curves are drawn with, and what that looks like.
+/// Markers of a few curves, with their pictures.
 const MARKERS: [(Marker, &str); 3] =
     [(Marker::Braille, "fine"), (Marker::Dot, "dots"), (Marker::Block, "blocks")];
 

@@ -1,4 +1,4 @@
-//! What holds the sum of Eq. 35 at an instant at which hardly anything accelerates.
+//! The holder of the sum of Eq. 35 at an instant at which hardly anything accelerates.
 //!
 //! The paper concludes from rest that `sum(J^T R R_C dl_1 + J_Omega^T R R_C dl_2)` vanishes at every joint. Where it does not,
 //! something else in Eq. 35 makes up for it: the torsional viscosity of the fingertips or the damping of the law, which let go in
@@ -13,10 +13,10 @@ use nalgebra::Vector3;
 
 /// By how much what is left may exceed the Coulomb friction of its joint: a joint that is about to slide is still moving.
 const FRICTION_SLACK: f64 = 1.05;
-/// What acceleration may make of the sum.
+/// Largest share of the sum that acceleration may have.
 const INERTIA: f64 = 0.05;
 
-/// What holds the sum of Eq. 35.
+/// The holder of the sum of Eq. 35.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Holder {
     /// Joints that stick: the largest share of a joint's Coulomb friction.
@@ -28,7 +28,7 @@ pub(super) enum Holder {
 }
 
 impl Holder {
-    /// What holds it in a sample of a run.
+    /// Returns the holder in a sample of a run.
     pub(super) fn of(done: &Done, sample: &Sample) -> Self {
         let (sum_nm, left_nm) = sums(done, sample);
         let joints = done.scene.joints.iter();
@@ -42,7 +42,7 @@ impl Holder {
         if share <= INERTIA { Self::Viscosity(share) } else { Self::Nothing }
     }
 
-    /// Whether something is known to hold it.
+    /// Returns `true` if something is known to hold it.
     pub(super) fn is_known(self) -> bool {
         self != Self::Nothing
     }
@@ -75,7 +75,8 @@ fn sums(done: &Done, sample: &Sample) -> (JointVector, JointVector) {
     (sum_nm, left_nm)
 }
 
-/// How long the torsional viscosity takes to let go, `b / K_st`, s: the longest of the fingertips; none without `u_st`.
+/// Returns the time that the torsional viscosity takes to let go, `b / K_st`, s: the longest of the fingertips; none
+/// without `u_st`.
 pub(super) fn torsion_time_s(done: &Done, sample: &Sample) -> Option<f64> {
     let stiffness_nm = done.scene.control.attitude_stiffness_nm();
     let tips = done.scene.fingertips.iter().zip(&sample.contacts);

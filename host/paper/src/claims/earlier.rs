@@ -1,4 +1,4 @@
-//! What the paper says against the law before it (Secs. 1 and 3), whose `u_I` integrates each joint's velocity.
+//! The paper's objections to the law before it (Secs. 1 and 3), whose `u_I` integrates each joint's velocity.
 
 use super::largest;
 use crate::claim::{Claim, Figure, Row, Verdict, number, percent};
@@ -60,7 +60,7 @@ pub(super) fn effective_on_polyhedra(polyhedra: &Polyhedra) -> Row {
     row("polyhedra", words.join("; "), Verdict::holds(holds))
 }
 
-/// How many polyhedra a law holds, in words.
+/// Returns the number of polyhedra that a law holds, in words.
 fn words(polyhedra: &Polyhedra, case: Case) -> String {
     let (held, often) = (polyhedra.held(case), polyhedra.held_at_10_khz(case));
     let more = if often == held { String::new() } else { format!("; at 10 kHz {often}") };

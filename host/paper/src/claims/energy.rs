@@ -8,7 +8,7 @@ use blindgrasp_sim::summary::{REST_JOINT_SPEED_RAD_S, REST_OBJECT_SPEED_M_S, RES
 
 /// Part of the exchanged energy that the balance may miss at any tick.
 const MISSED: f64 = 1e-3;
-/// How long hardly anything is exchanged, s.
+/// Time in which hardly anything is exchanged, s.
 const BEGINNING_S: f64 = 0.01;
 /// Order with which what is missed has to shrink with the integrator's step.
 const LEAST_ORDER: f64 = 1.8;
@@ -31,12 +31,12 @@ pub(super) fn balance(evidence: &Evidence) -> Result<Claim, EvidenceError> {
     })
 }
 
-/// What the balance misses.
+/// The error of the balance.
 #[derive(Default)]
 struct Missed {
     /// The most at a tick, J.
     most_j: f64,
-    /// What was exchanged in the whole run, J.
+    /// The energy that was exchanged in the whole run, J.
     exchanged_j: f64,
     /// The most at a tick as a part of what was exchanged up to it.
     share: f64,
@@ -93,7 +93,8 @@ pub(super) fn balance_row(done: &Done) -> Row {
     row
 }
 
-/// What the motors did beyond the law in continuous time and at full force, J: what Eq. 39 misses at the end.
+/// Returns the work of the motors beyond the law in continuous time and at full force, J: what Eq. 39 misses at the
+/// end.
 fn fed(samples: &[Sample]) -> f64 {
     let (Some(first), Some(last)) = (samples.first(), samples.last()) else { return 0.0 };
     let (first, last) = (&first.energies, &last.energies);

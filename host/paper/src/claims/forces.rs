@@ -64,7 +64,7 @@ pub(super) fn residual_row(done: &Done) -> Row {
     row
 }
 
-/// Why a residual is still there, in words.
+/// Returns the reason for which a residual is still there, in words.
 fn remark(done: &Done, sample: &Sample, holder: Holder) -> String {
     match holder {
         Holder::Friction(share) => format!(
@@ -102,7 +102,7 @@ pub(super) fn tangential(evidence: &Evidence) -> Result<Claim, EvidenceError> {
     })
 }
 
-/// How far the multipliers are from what `u_s` asks for, and from what `u_st` supplies, N.
+/// Returns the differences of the multipliers from what `u_s` asks for, and from what `u_st` supplies, N.
 fn tangential_errors(done: &Done, finger: usize, contact: &ContactSample) -> [f64; 2] {
     let (force, moment) = (contact.force_residual_n, contact.moment_residual_nm);
     let rolling_m = done.scene.hand.radius_m(finger) - contact.indentation_m;
@@ -196,7 +196,7 @@ pub(super) fn normal_row(done: &Done) -> Row {
     row
 }
 
-/// What forces and moments are compared with.
+/// The sizes that forces and moments are compared with.
 struct Scale {
     force_n: f64,
     moment_nm: f64,

@@ -84,7 +84,7 @@ fn largest(values: impl Iterator<Item = f64>) -> f64 {
     values.fold(0.0, |most, value| if value > most || value.is_nan() { value } else { most })
 }
 
-/// When and why a grasp was lost, in words.
+/// Returns the time and the reason of a loss, in words.
 fn lost(done: &Done) -> Option<String> {
     let summary = done.summary();
     summary.lost_at_s.map(|t_s| {

@@ -5,12 +5,12 @@ use crate::claim::{Claim, Figure, Row, Verdict};
 use crate::evidence::{Done, Evidence, EvidenceError};
 use crate::sensitivity::Sweep;
 
-/// What is varied.
+/// The key that is varied.
 const KEY: &str = "control.attitude_stiffness_nm";
 /// The sweeps in the paper's model, with the law at 1 kHz and at 10 kHz.
 const SAMPLED: [&str; 2] = ["stiffness", "stiffness-continuous"];
-/// How much larger a `K_st` the faster law has to hold for sampling to explain the loss. In proportion to its rate it would be
-/// ten times.
+/// Factor on the `K_st` that the faster law has to hold for sampling to explain the loss. In proportion to its rate it
+/// would be ten times.
 const FASTER: f64 = 5.0;
 /// `K_st` of Table VII, N m.
 const TABLE_VII_NM: f64 = 5e-3;
@@ -63,7 +63,7 @@ pub(super) fn region(sweeps: &[Sweep]) -> Claim {
     }
 }
 
-/// Whether the largest `K_st` that is held grows as the law gets faster.
+/// Returns `true` if the largest `K_st` that is held grows as the law gets faster.
 fn sampling_explains(sweeps: &[Sweep]) -> bool {
     let largest = |name: &str| {
         let sweep = sweeps.iter().find(|sweep| sweep.varied.name == name)?;

@@ -1,4 +1,4 @@
-//! Whether `u_st` can supply the counter force that Eqs. 53 and 54 ask for at all.
+//! The claim that `u_st` can supply the counter force which Eqs. 53 and 54 ask for at all.
 //!
 //! `B_sti` is a sum of two axial vectors of rotation matrices, one for each neighbour. Such a vector is twice the sine of the
 //! angle long, so that no turn of the fingertips makes `K_st |B_sti|` larger than `4 K_st`. Eqs. 53 and 54 ask it to balance the

@@ -6,11 +6,12 @@ use crate::evidence::{Done, Evidence, EvidenceError};
 use blindgrasp_sim::sample::Sample;
 use blindgrasp_sim::summary::at_rest;
 
-/// How long everything has to have been at rest in between, s, for a run that is not at its end to count as explained.
+/// Time for which everything has to have been at rest in between, s, for a run that is not at its end to count as
+/// explained.
 const RESTED_S: f64 = 5.0;
 /// Part of their peak that speeds have to have fallen to, to count as falling.
 const FALLEN: f64 = 0.05;
-/// How long the transient is watched, s.
+/// Time for which the transient is watched, s.
 const TRANSIENT_S: f64 = 20.0;
 
 pub(super) fn contact(evidence: &Evidence) -> Result<Claim, EvidenceError> {

@@ -1,4 +1,4 @@
-//! Where the runs start (Table III, Eq. 59), and the weight that the paper neglects (assumption 5).
+//! The start of the runs (Table III, Eq. 59), and the weight that the paper neglects (assumption 5).
 
 use super::{calm, largest, row, runs};
 use crate::claim::{Claim, Figure, Row, Verdict, number, percent};

@@ -12,7 +12,7 @@ use nalgebra::Vector3;
 
 /// One sample in so many.
 const STRIDE: usize = 20;
-/// What may be left, of the sum of the forces' and moments' own lengths.
+/// Largest remainder, as a share of the sum of the forces' and moments' own lengths.
 const LEFT: f64 = 1e-12;
 
 pub(super) fn balanced(evidence: &Evidence) -> Result<Claim, EvidenceError> {

@@ -1,4 +1,4 @@
-//! What an arm feels of each law, while the object is pushed in its hand.
+//! The torques that an arm feels of each law, while the object is pushed in its hand.
 
 use crate::evidence::{EvidenceError, scene, simulation};
 use crate::laws::{Law, Lost, built};
@@ -28,13 +28,13 @@ pub struct Carried {
     pub law: Law,
     /// Its gain.
     pub gain: f64,
-    /// How the grasp was lost, if it was.
+    /// The loss of the grasp, if there was one.
     pub lost: Option<Lost>,
     /// Largest torque on a joint of the arm that is neither damping nor weight, N m.
     pub arm_torque_nm: f64,
     /// Largest such torque on a joint of the fingers, N m.
     pub finger_torque_nm: f64,
-    /// How far the joints of the arm had turned when the push ended: the one that turned most, rad.
+    /// The largest turn of a joint of the arm when the push ended, rad.
     pub turned_by_push_rad: f64,
     /// And at the end of the run, rad.
     pub turned_at_end_rad: f64,
@@ -75,7 +75,7 @@ impl Carried {
     }
 }
 
-/// What the law puts on the joints besides damping and weight, N m.
+/// Returns the torques of the law on the joints besides damping and weight, N m.
 fn torques(scene: &Scene, samples: &[Sample]) -> Result<Vec<[f64; MAX_JOINTS]>, EvidenceError> {
     let refused = |cause: blindgrasp_shared::parameter::ParameterError| EvidenceError::Simulation {
         run: RUN.to_owned(),

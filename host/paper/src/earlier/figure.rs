@@ -1,4 +1,4 @@
-//! Where the grasp comes to rest, over the gain of each law, a line for each way.
+//! The figure of where the grasp comes to rest, over the gain of each law, a line for each way.
 
 use super::{Comparison, Final, GAINS, PATHS};
 use crate::figures::{Drawing, Drawn};
@@ -81,7 +81,7 @@ impl Comparison {
     }
 }
 
-/// What a law has beside `u_s`: its name where there is little room.
+/// Returns the term that a law has beside `u_s`: its name where there is little room.
 fn term(law: Law) -> &'static str {
     match law {
         Law::NormalOnly => "u_s",

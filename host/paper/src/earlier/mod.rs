@@ -30,7 +30,7 @@ pub struct Comparison {
     pub arm: Vec<Carried>,
 }
 
-/// How many runs that is.
+/// Returns the number of runs.
 pub fn runs() -> usize {
     paths::plan().len() + objects::SHAPES.len() + arm::LAWS.len()
 }

@@ -11,12 +11,12 @@ const RUN: &str = "objects";
 /// From the middle of the octahedron to its corners, m: its faces are about as wide as the cube's.
 const OCTAHEDRON_M: f64 = 0.04;
 
-/// What became of an object.
+/// The result of an object.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Object {
-    /// What it is.
+    /// Its name.
     pub name: &'static str,
-    /// How long it was grasped, s.
+    /// Time for which it was grasped, s.
     pub duration_s: f64,
     /// Under each law, in the order of [`Case::ALL`].
     pub grasps: Vec<Grasped>,
@@ -41,7 +41,7 @@ fn ideal(name: &str) -> Result<SceneFile, EvidenceError> {
     Ok(scene(RUN, name, &["duration_s=10".to_owned()])?.file)
 }
 
-/// Where the search of `scene new` puts an octahedron.
+/// Returns the scene of an octahedron, where the search of `scene new` puts it.
 fn octahedron() -> Result<SceneFile, EvidenceError> {
     let like = ideal("cube-ideal")?;
     let refused = |cause| EvidenceError::Scene { run: RUN.to_owned(), cause };

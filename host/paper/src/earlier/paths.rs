@@ -45,7 +45,7 @@ const SLOW_RAD_S: f64 = 1e-2;
 /// Ticks from one sample to the next.
 const SAMPLE_TICKS: u64 = 20;
 
-/// Where a way ended.
+/// The end of a way.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Final {
     /// The law.
@@ -54,13 +54,13 @@ pub struct Final {
     pub gain: f64,
     /// The way.
     pub path: &'static str,
-    /// How the grasp was lost, if it was.
+    /// The loss of the grasp, if there was one.
     pub lost: Option<Lost>,
-    /// How far the object moved while the push rose and lasted, m.
+    /// Distance by which the object moved while the push rose and lasted, m.
     pub pushed_m: f64,
-    /// Where the object is in the end, from where it was at the start, m.
+    /// Position of the object at the end, from that at the start, m.
     pub moved_m: [f64; 3],
-    /// How it has turned since, a rotation vector in base axes, rad.
+    /// Its turn since, a rotation vector in base axes, rad.
     pub turned_rad: [f64; 3],
     /// By how much each fingertip has turned against the next, rad.
     pub relative_turns_rad: Vec<f64>,
@@ -75,17 +75,17 @@ pub struct Final {
 }
 
 impl Final {
-    /// Whether the grasp held.
+    /// Returns `true` if the grasp held.
     pub fn held(&self) -> bool {
         self.lost.is_none()
     }
 
-    /// Whether it held, and came near enough to rest to show where and with which forces.
+    /// Returns `true` if it held, and came near enough to rest to show where and with which forces.
     pub fn rests(&self) -> bool {
         self.held() && self.joint_speed_max_rad_s < SLOW_RAD_S
     }
 
-    /// How far the object is from where it was at the start, m.
+    /// Returns the distance of the object from where it was at the start, m.
     pub fn distance_m(&self) -> f64 {
         Vector3::from(self.moved_m).norm()
     }
@@ -125,7 +125,7 @@ impl Final {
     }
 }
 
-/// How the object has turned, a rotation vector in base axes, rad.
+/// Returns the turn of the object, a rotation vector in base axes, rad.
 fn turn(from: &Sample, to: &Sample) -> Vector3<f64> {
     let q: UnitQuaternion<f64> = to.attitude * from.attitude.inverse();
     let (cosine, axis) = (q.w.abs(), q.imag() * q.w.signum());

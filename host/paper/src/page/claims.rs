@@ -6,7 +6,7 @@ use crate::expected::expected;
 use crate::report::Paper;
 use maud::{Markup, html};
 
-/// How many verdicts of each kind.
+/// Returns the number of verdicts of each kind.
 pub(super) fn tally(paper: &Paper) -> Markup {
     let count = |verdict| {
         paper.claims.iter().flat_map(|claim| &claim.rows).filter(|row| row.verdict == verdict).count()

@@ -66,7 +66,7 @@ fn outcome(grasped: &Grasped) -> Markup {
     }
 }
 
-/// How many of some polyhedra each law holds.
+/// Returns the shares of some polyhedra that each law holds.
 fn shares(name: &str, outcomes: &[&Outcome]) -> Markup {
     let held = |case, test: fn(&Grasped) -> bool| {
         outcomes.iter().filter(|outcome| outcome.under(case).is_some_and(test)).count()

@@ -63,7 +63,7 @@ pub(super) fn described(svg: &str, words: &str) -> String {
     svg.replacen("<svg ", &label.replace("></svg>", " "), 1)
 }
 
-/// What a panel shows, in words.
+/// Returns the content of a panel, in words.
 fn words(chart: &Figure, panel: &Panel) -> String {
     let values = panel.lines.iter().flat_map(|line| &line.values).filter(|value| value.is_finite());
     let (least, most) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(least, most), value| {

@@ -1,4 +1,4 @@
-//! What came out, in a few sentences, for whoever reads no further.
+//! The results in a few sentences, for whoever reads no further.
 
 use super::claims::{class, sign};
 use crate::claim::{Verdict, number};
@@ -29,7 +29,7 @@ pub(super) fn summary(paper: &Paper) -> Markup {
 
 type Sentence = Option<(Verdict, &'static str, String)>;
 
-/// What the theory says of its own model, in continuous time.
+/// Returns the sentence on the theory in its own model, in continuous time.
 fn theory(paper: &Paper) -> Sentence {
     let runs = ["prism-continuous", "cube-continuous"];
     let rows =
@@ -41,7 +41,7 @@ fn theory(paper: &Paper) -> Sentence {
     Some((worst, "In the paper's own model, in continuous time, its theory holds.", numbers))
 }
 
-/// What `u_st` is for.
+/// Returns the sentence on the use of `u_st`.
 fn stiffness(paper: &Paper) -> Sentence {
     let [without, with] = ["cube-normal-only", "cube-continuous"].map(|name| paper.evidence.run(name).ok());
     let holds = without?.summary().lost_at_s.is_some() && with?.summary().grasp_held;
@@ -105,7 +105,7 @@ fn earlier(paper: &Paper) -> Sentence {
     ))
 }
 
-/// What the experiments rest on.
+/// Returns the sentence on the friction that the experiments rest on.
 fn friction(paper: &Paper) -> Sentence {
     let sweep = paper.sweeps.iter().find(|sweep| sweep.varied.name == "friction")?;
     let Limits { below, .. } = sweep.limits()?;

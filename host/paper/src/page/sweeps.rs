@@ -30,7 +30,7 @@ pub(super) fn section(sweeps: &[Sweep]) -> Result<Markup, String> {
     ))
 }
 
-/// Where the grasp fails, a line a sweep.
+/// Returns the table of the values at which the grasp fails, a line a sweep.
 fn overview(sweeps: &[&Sweep]) -> Markup {
     html! {
         table.stack {
@@ -60,7 +60,7 @@ fn overview(sweeps: &[&Sweep]) -> Markup {
     }
 }
 
-/// Where it fails in one direction, and how far that is from the value of the scene.
+/// Returns the value at which it fails in one direction, and its distance from the value of the scene.
 fn limit(sweep: &Sweep, edge: Option<Edge>, direction: &str, extreme: fn(f64, f64) -> f64) -> Markup {
     let usual = sweep.varied.usual.unwrap_or_default();
     match edge {
@@ -84,7 +84,7 @@ fn text(value: f64) -> String {
     Value::number(value).text
 }
 
-/// What the signs of the curves mean.
+/// Returns the legend of the curves.
 fn legend() -> Markup {
     html! {
         ul.legend aria-label="Signs of the curves" {
@@ -125,7 +125,7 @@ fn article(sweep: &Sweep) -> Result<Markup, String> {
     })
 }
 
-/// How it fails, at the values next to those at which it is held.
+/// Returns the reasons of the losses, at the values next to those at which it is held.
 fn reason(sweep: &Sweep) -> Option<String> {
     let Limits { below, above } = sweep.limits()?;
     let at = |edge: Edge| {

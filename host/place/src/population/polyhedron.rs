@@ -20,7 +20,7 @@ const FARTHEST: f64 = 2.5;
 pub struct RandomPolyhedron {
     /// Its corners, m.
     pub corners_m: Vec<[f64; 3]>,
-    /// How many faces it has.
+    /// Number of its faces.
     pub faces: usize,
     /// Largest distance between two corners, m.
     pub extent_m: f64,
@@ -64,7 +64,7 @@ fn tangent_plane(normal: &Vector3<f64>, axes: &Vector3<f64>) -> (Vector3<f64>, f
     (*normal, normal.component_mul(axes).norm_squared().square_root())
 }
 
-/// Where three planes meet that no other cuts off.
+/// Returns the points where three planes meet that no other cuts off.
 fn meeting_points(planes: &[(Vector3<f64>, f64)]) -> Vec<Vector3<f64>> {
     let mut points = Vec::new();
     for i in 0..planes.len() {

@@ -1,4 +1,5 @@
-//! What came of the runs over one variable: when they came to rest or were lost, and the friction that they asked for.
+//! The results of the runs over one variable: when they came to rest or were lost, and the friction that they asked
+//! for.
 
 use super::super::axes::{Chart, Frame, Ruler};
 use super::super::drawing::{self, Drawing, PANEL_HEIGHT as ALONE_HEIGHT, PANEL_WIDTH, TITLE_HEIGHT, WIDTH};
@@ -26,24 +27,24 @@ const MARK: i32 = 5;
 pub struct Curve {
     /// Over it.
     pub title: String,
-    /// What is varied.
+    /// The variable.
     pub x: Variable,
-    /// What came of the runs.
+    /// The results of the runs.
     pub dots: Vec<Dot>,
 }
 
-/// What came of a run.
+/// The result of a run.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Dot {
     /// The number of its value.
     pub value: usize,
-    /// What came of it.
+    /// The outcome.
     pub mark: Mark,
     /// The friction coefficient that the grasp asked for.
     pub friction: f64,
 }
 
-/// What is drawn at a place.
+/// The sign that is drawn at a place.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Sign {
     Full(Rgb),
@@ -112,7 +113,8 @@ impl Curve {
         Panel { y: Ruler { words: "friction needed, max".into(), range, ticks }, line: joined(&signs), signs }
     }
 
-    /// Where the grasp is lost, with one run at least: from the middle between a value and its neighbour to the next.
+    /// Returns the stretches in which the grasp is lost, with one run at least: from the middle between a value and its
+    /// neighbour to the next.
     fn lost(&self, places: &[f64], x: &Ruler) -> Vec<(f64, f64)> {
         let is_lost = |dot: &Dot| (places[dot.value], matches!(dot.mark, Mark::Lost(_)));
         let mut verdicts: Vec<(f64, bool)> = self.dots.iter().map(is_lost).collect();
@@ -174,7 +176,7 @@ impl Drawing for Alone<'_> {
     }
 }
 
-/// Where the grasp is lost.
+/// Returns the colour of stretches in which the grasp is lost.
 fn pale() -> Rgb {
     mix(VERMILLION, WHITE, 0.13)
 }

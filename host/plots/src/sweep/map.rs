@@ -1,4 +1,4 @@
-//! What came of the runs over two variables: a map of coloured fields.
+//! The results of the runs over two variables: a map of coloured fields.
 
 use super::super::axes::{Chart, Frame, Ruler};
 use super::super::drawing::{self, Drawing, PANEL_WIDTH, TITLE_HEIGHT, WIDTH};
@@ -33,7 +33,7 @@ pub struct Map {
     pub x: Variable,
     /// From the bottom to the top.
     pub y: Variable,
-    /// What came of the runs: for each value of `y`, one for each of `x`; none where it is not known.
+    /// The results of the runs: for each value of `y`, one for each of `x`; none where it is not known.
     pub marks: Vec<Vec<Option<Mark>>>,
 }
 
@@ -199,7 +199,7 @@ impl Map {
     }
 }
 
-/// How a field is filled.
+/// The filling of a field.
 enum Fill {
     Plain(Rgb),
     Crossed,

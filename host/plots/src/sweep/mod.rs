@@ -12,7 +12,7 @@ pub use curve::{Curve, Dot};
 pub use map::Map;
 pub use variable::{Spread, Variable};
 
-/// What came of a run.
+/// The outcome of a run.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Mark {
     /// The grasp held, and everything was at rest from this time on, s.

@@ -72,14 +72,14 @@ fn nothing_is_clipped(svg: &str) {
     assert!(boxes.len() > 5 && f64::from(LABEL_SIZE) > 0.0);
 }
 
-/// Whether a line goes neither along nor up.
+/// Returns `true` if a line goes neither along nor up.
 fn is_slanted(line: &str) -> bool {
     let points: Vec<(&str, &str)> =
         attribute(line, "points").split_whitespace().map(|point| point.split_once(',').unwrap()).collect();
     points.len() == 2 && points[0].0 != points[1].0 && points[0].1 != points[1].1
 }
 
-/// How many rectangles there are of each colour.
+/// Returns the number of rectangles of each colour.
 fn colours(svg: &str) -> BTreeMap<&str, usize> {
     let mut colours = BTreeMap::new();
     for rectangle in svg.split("<rect").skip(2) {

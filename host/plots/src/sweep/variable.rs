@@ -10,25 +10,26 @@ use std::ops::Range;
 const GAP: f64 = 10.0;
 /// Pixels that a line of text takes.
 const LINE: f64 = 17.0;
-/// How far zero lies from the smallest number above it on a logarithmic axis: this share of the decades, and at least so many.
+/// Distance of zero from the smallest number above it on a logarithmic axis: this share of the decades, and at least so
+/// many.
 const ZERO: (f64, f64) = (0.12, 0.3);
 /// Letters of a word along an axis.
 const LONGEST_WORD: usize = 16;
 
-/// What is varied.
+/// A quantity that is varied.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Variable {
-    /// What it is called.
+    /// Its name.
     pub name: String,
     /// Its unit; empty where there is none.
     pub unit: String,
-    /// How its values lie along the axis.
+    /// The spread of its values along the axis.
     pub spread: Spread,
     /// Its values.
     pub values: Vec<String>,
 }
 
-/// How values lie along an axis.
+/// The spread of values along an axis.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Spread {
     /// By their size.
@@ -39,7 +40,7 @@ pub enum Spread {
     Listed,
 }
 
-/// Where an axis lies.
+/// The direction of an axis.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Along {
     Horizontal,
@@ -47,7 +48,7 @@ pub(super) enum Along {
 }
 
 impl Variable {
-    /// Where each value lies.
+    /// Returns the place of each value.
     pub(super) fn places(&self) -> Vec<f64> {
         match &self.spread {
             Spread::Linear(numbers) => numbers.clone(),
@@ -105,7 +106,7 @@ fn decades(numbers: &[f64]) -> Option<(f64, f64)> {
     series::extremes(numbers.iter().filter(|number| **number > 0.0).map(|number| number.log10()))
 }
 
-/// Where zero lies on a logarithmic axis.
+/// Returns the place of zero on a logarithmic axis.
 fn zero(numbers: &[f64]) -> f64 {
     let (low, high) = decades(numbers).unwrap_or_default();
     low - (ZERO.0 * (high - low)).max(ZERO.1)
@@ -120,7 +121,7 @@ fn width(label: &str) -> f64 {
     f64::from(text::width(label, (f64::from(LABEL_SIZE) / text::SIZE_PER_EM) as f32))
 }
 
-/// Whether labels stand clear of each other.
+/// Returns `true` if labels stand clear of each other.
 fn fits(ticks: &[(f64, String)], per_unit: f64, along: Along) -> bool {
     ticks.windows(2).all(|pair| {
         let needed = match along {

@@ -10,7 +10,7 @@ use blindgrasp_shared::signals::{self, Value};
 use blindgrasp_wire::Record;
 use std::sync::LazyLock;
 
-/// What limits a joint, by the bits of its limits.
+/// Words for the limits of a joint, by their bits.
 static LIMITED_BY: LazyLock<[String; 16]> = LazyLock::new(|| {
     std::array::from_fn(|bits| {
         let limits = Limit::ALL.into_iter().filter(|&limit| bits & limit as usize != 0);
@@ -24,11 +24,11 @@ static LIMITED_BY: LazyLock<[String; 16]> = LazyLock::new(|| {
 pub struct Column {
     /// Its name; those of joints begin with the joint's, and a full stop.
     pub name: String,
-    /// What it holds.
+    /// The kind of its values.
     pub kind: Kind,
     /// Its unit; empty for what has none.
     pub unit: &'static str,
-    /// What it is.
+    /// Its meaning.
     pub words: &'static str,
     source: Source,
 }
@@ -36,7 +36,7 @@ pub struct Column {
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Source {
     Derived(Derived, Option<usize>),
-    /// Where in [`Row::told`] it is.
+    /// The place in [`Row::told`].
     Told(usize),
 }
 
@@ -143,9 +143,9 @@ impl Column {
 /// A record, of which every column takes its cell.
 pub struct Row {
     decoded: Decoded,
-    /// When the recording begins.
+    /// The beginning of the recording.
     start_ns: u64,
-    /// What the hand told, signal by signal, and of a signal of joints joint by joint.
+    /// The values that the hand told, signal by signal, and of a signal of joints joint by joint.
     told: Vec<Value<'static>>,
 }
 
@@ -219,7 +219,7 @@ fn nearest<'a>(pattern: &str, known: impl Iterator<Item = &'a str>) -> String {
     if words.starts_with("did you mean") { words } else { "the names are".into() }
 }
 
-/// Whether a name is like a pattern in which `*` stands for anything.
+/// Returns `true` if a name is like a pattern in which `*` stands for anything.
 fn is_like(pattern: &str, name: &str) -> bool {
     let mut pieces = pattern.split('*');
     let Some(mut rest) = pieces.next().and_then(|first| name.strip_prefix(first)) else { return false };

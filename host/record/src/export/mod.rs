@@ -22,10 +22,10 @@ use std::thread;
 /// Rows that go from one thread to the other at once, and how many such batches may wait.
 const BATCH: usize = 1024;
 const BATCHES: usize = 4;
-/// How much later than its tick a record may come, s.
+/// Longest time that a record may come after its tick, s.
 const LATEST_S: f64 = 2.0;
 
-/// What to export.
+/// The request for an export.
 #[derive(Clone, Debug)]
 pub struct Request {
     /// The number of the device.
@@ -36,11 +36,11 @@ pub struct Request {
     pub from_s: Option<f64>,
     /// Up to this time, s.
     pub until_s: Option<f64>,
-    /// When the recording begins, ns since 1970.
+    /// The beginning of the recording, ns since 1970.
     pub start_ns: u64,
 }
 
-/// What came of it.
+/// The result of an export.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Exported {
     /// Rows.
@@ -49,11 +49,11 @@ pub struct Exported {
     pub lost: u64,
     /// Places where some are.
     pub gaps: u64,
-    /// Why the table ends before the recording does.
+    /// The reason for which the table ends before the recording does.
     pub ended: Option<String>,
 }
 
-/// Why there is no table.
+/// The reason for which there is no table.
 #[derive(Debug, thiserror::Error)]
 pub enum ExportError {
     /// The recording can't be read.
@@ -104,9 +104,9 @@ impl table::Layout for Layout {
     }
 }
 
-/// What goes from the reading thread to the writing one.
+/// A batch from the reading thread to the writing one.
 enum Batch {
-    /// Whose rows follow.
+    /// The device whose rows follow.
     About(Box<About>),
     Rows(Vec<Row>),
 }
@@ -231,7 +231,7 @@ fn write(
     Ok(table.finish()?)
 }
 
-/// What a table that describes itself says of its device.
+/// Returns the words on the device of a table that describes itself.
 fn metadata(about: &About, request: &Request) -> Vec<(String, String)> {
     let mut metadata = vec![
         ("hand".to_owned(), about.hand.clone()),

@@ -1,4 +1,4 @@
-//! What a recording says of a device: who it is, and its parameters.
+//! The description of a device in a recording: who it is, and its parameters.
 
 use blindgrasp_body::MAX_JOINTS;
 use blindgrasp_model::{HandFile, HandModel};
@@ -8,7 +8,7 @@ use blindgrasp_shared::tick::{Config, Params};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use serde_json::{Value, json};
 
-/// Who a device is, told at the beginning of each session.
+/// The identity of a device, told at the beginning of each session.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct About {
     /// [`INTERFACE_VERSION`](blindgrasp_shared::telemetry::INTERFACE_VERSION) of the device.
@@ -31,11 +31,11 @@ pub struct About {
     pub fingertip_count: u8,
     /// Time from one tick to the next, us.
     pub period_us: u32,
-    /// What gives the device its time, in words.
+    /// The source of the device's clock, in words.
     pub clock: String,
-    /// Why the device started, in words.
+    /// The cause of the device's start, in words.
     pub reset: String,
-    /// How it ended before, in words, if that was not in order.
+    /// The crash in which it ended before, in words, if it did.
     pub crash: Option<String>,
     /// Level of its brown-out reset, in words.
     #[serde(default)]
@@ -60,7 +60,7 @@ pub struct About {
 }
 
 impl About {
-    /// What a device says of itself; nothing else is known yet.
+    /// Returns the description that a device gives of itself; nothing else is known yet.
     pub fn of(identity: &Identity<'_>) -> Self {
         let image = &identity.image;
         Self {
@@ -104,7 +104,7 @@ impl About {
         (model.hand.joint_count() == self.joint_names.len()).then_some(model)
     }
 
-    /// How many joints of it can be read.
+    /// Returns the number of its joints that can be read.
     pub(super) fn joints(&self) -> usize {
         usize::from(self.joint_count).min(MAX_JOINTS)
     }
@@ -126,7 +126,7 @@ mod hexadecimal {
 /// A parameter and what it is.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Setting {
-    /// Which.
+    /// The parameter.
     pub parameter: Parameter,
     /// Of which joint or axis.
     pub index: u8,

@@ -1,4 +1,4 @@
-//! When a tick was, on the host's clock.
+//! The times of ticks, on the host's clock.
 //!
 //! A record comes some time after its tick: it waits in queues, and in the buffers of a USB bridge and of two operating
 //! systems. The shortest of these delays is nearly always the same, whatever the others are. So the difference between the
@@ -28,7 +28,7 @@ pub(super) struct Clock {
     /// Least `arrival - tick * period` of the half before and of this one.
     before: i64,
     now: i64,
-    /// When this half began.
+    /// The beginning of this half.
     begun: i64,
     last: Stamp,
 }

@@ -1,4 +1,4 @@
-//! What was received, decoded: records with their time on the host's clock, angles, speeds, and what is missing before
+//! Received payloads, decoded: records with their time on the host's clock, angles, speeds, and what is missing before
 //! them. The writer decodes with this as it records, and readers get the same values from the raw payloads.
 
 use super::about::{About, Setting};
@@ -24,13 +24,13 @@ const SETTLED: f32 = 8.0;
 /// A record, and what follows from those before it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Decoded {
-    /// Which device of the recording.
+    /// The device of the recording.
     pub device: usize,
-    /// When the tick was, on the host's clock.
+    /// The time of the tick, on the host's clock.
     pub at: Stamp,
-    /// When the record came.
+    /// The arrival of the record.
     pub arrived: Stamp,
-    /// When the tick was, on the device's clock, s since its start; 0 where its period is not known.
+    /// The time of the tick, on the device's clock, s since its start; 0 where its period is not known.
     pub time_s: f64,
     /// The record.
     pub record: Record,
@@ -49,7 +49,7 @@ impl Decoded {
     }
 }
 
-/// What a payload is.
+/// A payload, decoded.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Arrival {
     /// A record.
@@ -58,7 +58,7 @@ pub enum Arrival {
     Input {
         /// Records that are missing between the one before and this one.
         lost_before: u64,
-        /// When its tick was.
+        /// The time of its tick.
         at: Stamp,
         /// The command of its tick, and what became of it.
         answer: Option<Answer>,
@@ -102,12 +102,12 @@ impl Decoder {
         None
     }
 
-    /// What the device told of itself last.
+    /// Returns the last description that the device gave of itself.
     pub fn about(&self, device: usize) -> Option<&About> {
         self.tracks.get(device)?.about.as_ref()
     }
 
-    /// Why a device's records can't be decoded, if they can't.
+    /// Returns the reason for which a device's records can't be decoded, if they can't.
     pub fn obstacle(&self, device: usize) -> Option<RecordingError> {
         let about = self.about(device).filter(|about| about.interface_version != INTERFACE_VERSION)?;
         Some(RecordingError::OtherInterface {

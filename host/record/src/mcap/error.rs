@@ -1,11 +1,11 @@
-//! Why a recording can't be written or read.
+//! Errors in writing and reading recordings.
 
 use super::writer::Saved;
 use blindgrasp_shared::telemetry::INTERFACE_VERSION;
 use std::io;
 use std::path::PathBuf;
 
-/// Why a recording can't be written or read.
+/// The reason for which a recording can't be written or read.
 #[derive(Debug, thiserror::Error)]
 pub enum RecordingError {
     /// There is a file already.
@@ -17,11 +17,11 @@ pub enum RecordingError {
     /// The file system says no.
     #[error("cannot {action} {}", .path.display())]
     Io {
-        /// What was to be done.
+        /// The action that failed.
         action: &'static str,
         /// The file.
         path: PathBuf,
-        /// What it said.
+        /// The cause.
         source: io::Error,
     },
     /// Nothing can be added any more.
@@ -29,9 +29,9 @@ pub enum RecordingError {
     Stopped {
         /// The file.
         path: PathBuf,
-        /// What the file system says; a full disk among others.
+        /// The words of the file system; a full disk among others.
         problem: String,
-        /// What is in the file.
+        /// The contents of the file.
         saved: Saved,
     },
     /// Something that MCAP can't hold.
@@ -48,7 +48,7 @@ pub enum RecordingError {
     NotARecording {
         /// The file.
         path: PathBuf,
-        /// What wrote it.
+        /// The library that wrote it.
         library: String,
     },
     /// A recording that a later program made.
@@ -58,7 +58,7 @@ pub enum RecordingError {
         path: PathBuf,
         /// Its format.
         theirs: u32,
-        /// What wrote it.
+        /// The library that wrote it.
         library: String,
         /// The newest that is known.
         ours: u32,
@@ -72,7 +72,7 @@ pub enum RecordingError {
         device: String,
         /// Its version.
         theirs: u16,
-        /// What recorded it.
+        /// The program that recorded it.
         program: String,
     },
 }

@@ -7,7 +7,7 @@ use blindgrasp_shared::limit::Limit;
 use blindgrasp_shared::parameters::Each;
 use blindgrasp_shared::signals::Value;
 
-/// How much an event matters.
+/// The severity of an event.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, prost::Enumeration)]
 #[repr(i32)]
 pub enum Level {

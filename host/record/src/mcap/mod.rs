@@ -44,7 +44,7 @@ use std::collections::BTreeMap;
 const FORMAT: u32 = 1;
 /// Profile of the files, and encoding of the raw channels.
 const PROFILE: &str = "blindgrasp";
-/// What writes them.
+/// The library that writes them.
 const LIBRARY: &str = concat!("blindgrasp ", env!("CARGO_PKG_VERSION"));
 /// Name of the metadata.
 const METADATA: &str = "blindgrasp";
@@ -67,7 +67,7 @@ impl Stamp {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Device(usize);
 
-/// What a channel holds.
+/// The content of a channel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Kind {
     Received,

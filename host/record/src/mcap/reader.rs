@@ -23,15 +23,15 @@ const FOOTER: u64 = 37;
 /// Something that was recorded.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Entry {
-    /// Which device.
+    /// The device.
     pub device: usize,
-    /// When; of a tick, when it was, of all else, when it came or happened.
+    /// The time; of a tick, when it was, of all else, when it came or happened.
     pub at: Stamp,
-    /// What.
+    /// The content.
     pub what: What,
 }
 
-/// What was recorded.
+/// The content of an entry.
 #[derive(Clone, Debug, PartialEq)]
 pub enum What {
     /// A session begins: who the device is.
@@ -44,23 +44,23 @@ pub enum What {
     Sent(Vec<u8>),
     /// Something happened.
     Event {
-        /// How much it matters.
+        /// Its severity.
         level: Level,
-        /// What it is about: `session`, `mode`, `fault`, `answer`, or `event`.
+        /// The subject: `session`, `mode`, `fault`, `answer`, or `event`.
         about: String,
-        /// What.
+        /// The words.
         words: String,
     },
     /// The link was cut here.
     Gap {
-        /// Why.
+        /// The reason.
         words: String,
     },
-    /// What became of the link.
+    /// The status of the link.
     Link(LinkStatus),
     /// The file is damaged: entries of the kind that follows are missing here. Not recorded, but found out.
     Hole {
-        /// How many.
+        /// The number of records that are missing.
         lost: u64,
     },
     /// A tick, decoded by the program that recorded, as its protobuf message. Only where it is asked for.
@@ -151,7 +151,7 @@ impl Recording {
         &self.channels.names
     }
 
-    /// What wrote it.
+    /// Returns the library that wrote it.
     pub fn library(&self) -> &str {
         &self.library
     }
@@ -162,7 +162,8 @@ impl Recording {
         self.span
     }
 
-    /// How many payloads were received from all devices, where the file says so: one that was finished does.
+    /// Returns the number of payloads that were received from all devices, where the file says so: one that was
+    /// finished does.
     pub fn received(&self) -> Option<u64> {
         let counts = &self.summary.as_ref()?.counts;
         let received = counts.iter().filter(|(channel, _)| {
@@ -171,7 +172,7 @@ impl Recording {
         Some(received.map(|(_, count)| count).sum())
     }
 
-    /// Whether it was finished: what was killed, or is still recorded, was not.
+    /// Returns `true` if it was finished: what was killed, or is still recorded, was not.
     pub fn is_finished(&self) -> bool {
         self.summary.is_some()
     }
@@ -207,7 +208,7 @@ impl Recording {
 struct Channels {
     names: Vec<String>,
     known: HashMap<u16, (usize, Kind)>,
-    /// Whether our own writer gave the numbers, so that a channel can be known by its number alone.
+    /// `true` if our own writer gave the numbers, so that a channel can be known by its number alone.
     fixed: bool,
 }
 
@@ -265,12 +266,12 @@ pub struct Entries {
 }
 
 impl Entries {
-    /// What was wrong with the file up to here; all of it when they have ended.
+    /// Returns the damage of the file up to here; all of it when they have ended.
     pub fn damage(&self) -> &Damage {
         self.pieces.damage()
     }
 
-    /// How far the file is read: bytes, of how many.
+    /// Returns the position in the file, bytes, and its length.
     pub fn position(&self) -> (u64, u64) {
         self.pieces.position()
     }
@@ -327,7 +328,7 @@ impl Entries {
         }
     }
 
-    /// What is missing at the end, where the summary tells how much there was.
+    /// Counts what is missing at the end, where the summary tells how much there was.
     fn count_end(&mut self) {
         let Some(expected) = &self.expected else {
             self.pieces.damage_mut().unfinished = true;
@@ -396,7 +397,7 @@ fn message(content: &[u8], channels: &Channels, ticks: bool) -> Option<Numbered>
     Some(Numbered { channel, sequence, device, kind, at, what })
 }
 
-/// What stands at the end of a file that was finished.
+/// The summary at the end of a file that was finished.
 #[derive(Debug)]
 struct Summary {
     channels: Vec<Vec<u8>>,

@@ -1,4 +1,4 @@
-//! What of a file can be read: its chunks, one after the other, each checked before anything of it is believed.
+//! The readable part of a file: its chunks, one after the other, each checked before anything of it is believed.
 //!
 //! A file is a row of records, each with its kind and length before it. Of these lengths one wrong bit is enough to lose
 //! the row; then the next chunk is looked for by what every chunk of ours has in its head, and by its checksum. So damage
@@ -40,16 +40,16 @@ pub struct Place {
     pub from: u64,
     /// ... up to this one, which can be read again, or the end of the file.
     pub until: u64,
-    /// What is wrong.
+    /// The damage.
     pub problem: &'static str,
 }
 
-/// What is wrong with a file.
+/// The damage of a file.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Damage {
     /// The first places that can't be read.
     pub places: Vec<Place>,
-    /// How many there are.
+    /// The number of damaged places.
     pub place_count: u64,
     /// Bytes that can't be read.
     pub bytes: u64,
@@ -66,7 +66,7 @@ pub struct Damage {
 }
 
 impl Damage {
-    /// Whether nothing is wrong; an unfinished file may still be whole.
+    /// Returns `true` if nothing is wrong; an unfinished file may still be whole.
     pub fn is_none(&self) -> bool {
         *self == Self { unfinished: self.unfinished, ..Self::default() }
     }
@@ -116,7 +116,7 @@ impl fmt::Display for Damage {
 
 /// Something of a file.
 pub(super) enum Piece {
-    /// Who wrote it.
+    /// The library that wrote the file.
     Header { profile: String, library: String },
     /// Metadata of ours, with its checksum right.
     Metadata(BTreeMap<String, String>),
@@ -124,7 +124,7 @@ pub(super) enum Piece {
     Chunk,
 }
 
-/// What is where the next record should be.
+/// The bytes at the place of the next record.
 enum Found {
     Piece(Piece),
     /// Something that is passed over.
@@ -137,7 +137,7 @@ enum Found {
 pub(super) struct Pieces {
     file: BufReader<File>,
     length: u64,
-    /// Where the next record begins.
+    /// The place of the next record.
     at: u64,
     /// Up to here everything was whole, or has been told as damage.
     trusted: u64,
@@ -174,7 +174,7 @@ impl Pieces {
         })
     }
 
-    /// What was wrong so far.
+    /// Returns the damage so far.
     pub(super) fn damage(&self) -> &Damage {
         &self.damage
     }
@@ -184,7 +184,7 @@ impl Pieces {
         &mut self.damage
     }
 
-    /// How far the file is read, of how many bytes.
+    /// Returns the position in the file, bytes, and its length.
     pub(super) fn position(&self) -> (u64, u64) {
         (self.at.min(self.length), self.length)
     }
@@ -376,7 +376,7 @@ fn opener() -> LinearReader {
     )
 }
 
-/// Whether these bytes may be the head of a chunk; so many are left in the file.
+/// Returns `true` if these bytes may be the head of a chunk; so many are left in the file.
 fn looks_like_chunk(bytes: &[u8], left: u64) -> bool {
     let number = |at: usize| {
         bytes.get(at..at + 8).and_then(|bytes| bytes.try_into().ok()).map_or(0, u64::from_le_bytes)

@@ -28,7 +28,7 @@ const CHECKPOINT_BYTES: usize = 1 << 20;
 /// Bits of a byte on a serial line.
 const BITS_A_BYTE: f64 = 10.0;
 
-/// What is in the file.
+/// The contents of the file.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Saved {
     /// Bytes.
@@ -45,7 +45,7 @@ impl fmt::Display for Saved {
     }
 }
 
-/// What went wrong, for good.
+/// A failure that is final.
 struct Failure {
     problem: String,
 }
@@ -75,7 +75,7 @@ pub struct Writer {
     buffer: Vec<u8>,
 }
 
-/// What the writer knows of a device.
+/// The writer's knowledge of a device.
 struct Recorded {
     name: String,
     track: Track,
@@ -134,7 +134,7 @@ impl Writer {
         Ok(writer)
     }
 
-    /// What makes the file describe itself.
+    /// Writes the records that make the file describe itself.
     fn preamble(&mut self) -> Result<(), RecordingError> {
         let mut metadata = BTreeMap::from([
             ("format".to_owned(), FORMAT.to_string()),
@@ -386,7 +386,7 @@ impl Writer {
         Ok(())
     }
 
-    /// What is in the file.
+    /// Returns the contents of the file.
     pub fn saved(&self) -> Saved {
         self.saved
     }
@@ -410,7 +410,7 @@ impl Writer {
         Ok(())
     }
 
-    /// What is in the file, if all that was gathered is.
+    /// Returns the contents of the file, if all that was gathered is in it.
     fn reached(&self) -> Saved {
         let seconds = self.span.map_or(0.0, |(first, last)| last.0.saturating_sub(first.0) as f64 / 1e9);
         Saved { bytes: self.file.length(), records: self.records, seconds }
@@ -570,7 +570,7 @@ impl Drop for Writer {
     }
 }
 
-/// What MCAP's writer wrote and the file has not got yet.
+/// The bytes that MCAP's writer wrote and the file has not got yet.
 #[derive(Clone, Default)]
 struct Gathered {
     bytes: Arc<Mutex<Vec<u8>>>,

@@ -29,7 +29,7 @@ enum Which {
     Name(String),
 }
 
-/// What is wrong with a change.
+/// An error in a change.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{text}: {problem}; {remedy}")]
 pub struct ChangeError {
@@ -85,7 +85,7 @@ fn parameter(key: &str) -> Option<(Parameter, &str)> {
 }
 
 impl Change {
-    /// Whether it acts only on grasps that begin after it.
+    /// Returns `true` if it acts only on grasps that begin after it.
     pub(super) fn is_of_the_grasp(&self) -> bool {
         self.parameter.is_gain()
     }

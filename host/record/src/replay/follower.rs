@@ -35,7 +35,7 @@ pub struct Follower {
     collector: Collector,
     /// A snapshot that has not been used yet: after which tick, and its bytes.
     snapshot: Option<(u32, Vec<u8>)>,
-    /// Which snapshots were made with the parameters in force.
+    /// The snapshots that were made with the parameters in force.
     usable: Usable,
     /// The tick of the last snapshot, the one after which the next is to be expected, and the state that was computed
     /// for it.
@@ -44,13 +44,13 @@ pub struct Follower {
     computed: Option<(u32, Vec<u8>)>,
     /// Changes of parameters that were asked for and not answered yet.
     asked: Vec<(u16, Option<Setting>)>,
-    /// Whether the parameters are still to be told.
+    /// `true` if the parameters are still to be told.
     parameters_due: bool,
     /// The last record that came: its tick and decimation.
     last: Option<(u32, u16)>,
     /// Time of the last record that was replayed, s.
     last_s: f64,
-    /// What was said of the link since.
+    /// The words on the link since.
     cut: Option<String>,
     comparison: Comparison,
     beside: Option<Beside>,
@@ -156,7 +156,7 @@ impl Follower {
         self.advance()
     }
 
-    /// What came of it.
+    /// Ends the replay and returns its report.
     ///
     /// # Errors
     /// If nothing could be replayed.
@@ -287,7 +287,7 @@ impl Follower {
         Ok(())
     }
 
-    /// Whether the parameters in force are not known.
+    /// Returns `true` if the parameters in force are not known.
     fn is_held(&self) -> bool {
         self.parameters_due || self.controller.is_none() || !self.asked.is_empty()
     }
@@ -575,7 +575,7 @@ impl Follower {
     }
 }
 
-/// Whether a record has what its tick took in.
+/// Returns `true` if a record has what its tick took in.
 fn has_input(record: &Record) -> bool {
     record.reading_failed.is_some() || !record.counts.as_slice().is_empty()
 }

@@ -1,4 +1,4 @@
-//! What of a recording concerns a replay, heard from the raw payloads.
+//! The part of a recording that concerns a replay, heard from the raw payloads.
 
 use crate::mcap::{About, Entry, Setting, Stamp, What};
 use blindgrasp_body::MAX_JOINTS;
@@ -20,7 +20,7 @@ pub enum Item {
     Asked {
         /// Number of the request.
         sequence: u16,
-        /// What it is to be; `None` if the device itself finds out.
+        /// The value that it is to have; `None` if the device itself finds out.
         setting: Option<Setting>,
     },
     /// A request was answered.
@@ -41,7 +41,7 @@ pub enum Item {
 /// A record, as it was told.
 #[derive(Clone, Debug)]
 pub struct Told {
-    /// When it came, since the beginning of the recording, s.
+    /// The time of its arrival, since the beginning of the recording, s.
     pub time_s: f64,
     /// The record.
     pub record: Record,

@@ -42,7 +42,7 @@ use std::thread;
 const BATCH: usize = 512;
 const BATCHES: usize = 8;
 
-/// What to replay, and how.
+/// The replay that is wanted.
 #[derive(Clone, Debug, Default)]
 pub struct Wanted {
     /// The hand, in place of the recorded one.
@@ -57,7 +57,7 @@ pub struct Wanted {
     pub until_s: Option<f64>,
 }
 
-/// Why something can't be replayed.
+/// The reason for which something can't be replayed.
 #[derive(Debug, thiserror::Error)]
 pub enum ReplayError {
     /// The recording can't be read.
@@ -76,9 +76,9 @@ pub enum ReplayError {
         "the firmware was built for the hand {recorded}, and this one is {found}: give the right one with --hand"
     )]
     OtherHand {
-        /// That of the firmware.
+        /// The hash of the firmware.
         recorded: String,
-        /// That of the file.
+        /// The hash of the file.
         found: String,
     },
     /// The hand's file in the recording is damaged.
@@ -97,11 +97,11 @@ pub enum ReplayError {
     /// A recorded parameter can't be.
     #[error("the recorded parameter `{parameter}` [{index}] does not fit the hand: {reason}")]
     Setting {
-        /// Which.
+        /// The parameter.
         parameter: Parameter,
         /// Of which joint or axis.
         index: u8,
-        /// Why.
+        /// The reason.
         reason: &'static str,
     },
     /// The recorded parameters can't be used.
@@ -121,7 +121,7 @@ pub enum ReplayError {
 /// Ticks that are missing or were not replayed.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Gap {
-    /// When it begins, since the beginning of the recording, s.
+    /// Its beginning, since the beginning of the recording, s.
     pub time_s: f64,
     /// Its first tick.
     pub from_tick: u32,
@@ -131,11 +131,11 @@ pub struct Gap {
     pub missing: u64,
     /// Records that were not replayed.
     pub not_replayed: u64,
-    /// Why.
+    /// The reason.
     pub reason: Reason,
 }
 
-/// Why ticks could not be replayed.
+/// The reason for which ticks could not be replayed.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Reason {
     /// The state before the first snapshot is not known.
@@ -175,7 +175,7 @@ impl fmt::Display for Reason {
 }
 
 impl Reason {
-    /// What to do about it next time.
+    /// Returns the remedy for the next time.
     fn remedy(&self) -> &'static str {
         match self {
             Self::Start | Self::BadSnapshot(_) => "record with snapshots, for at least two seconds",

@@ -1,4 +1,4 @@
-//! What other parameters would have made of the same counts: torques, limits and faults beside each other.
+//! The result of other parameters with the same counts: torques, limits and faults beside each other.
 
 use super::report::{JointChange, LimitShare, OpenLoop, Raising};
 use blindgrasp_shared::fault::Raised;

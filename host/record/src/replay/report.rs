@@ -1,11 +1,11 @@
-//! What came of a replay, as JSON and in words.
+//! The report of a replay, as JSON and in words.
 
 use super::{Gap, Reason};
 use crate::compare::Difference;
 use serde::{Serialize, Serializer};
 use std::fmt;
 
-/// What came of a replay.
+/// The report of a replay.
 #[derive(Clone, Debug, Serialize)]
 pub struct Report {
     /// The device.
@@ -24,24 +24,24 @@ pub struct Report {
     pub missing: u64,
     /// Snapshots of the device's whole state that were compared, too; what differs in them is counted above.
     pub snapshots: u64,
-    /// Where something is missing, or was not replayed: the first of them.
+    /// The places where something is missing, or was not replayed: the first of them.
     pub gaps: Vec<Gap>,
     /// All of them.
     pub gap_count: u64,
-    /// What other parameters would have done.
+    /// The result of other parameters.
     pub open_loop: Option<OpenLoop>,
-    /// What is wrong with the file; what could be read was replayed.
+    /// The damage of the file; what could be read was replayed.
     pub damage: Option<String>,
 }
 
-/// What other parameters would have made of the recorded counts.
+/// The result of other parameters with the recorded counts.
 #[derive(Clone, Debug, Serialize)]
 pub struct OpenLoop {
     /// [`Self::NOTE`].
     pub note: &'static str,
     /// The changes.
     pub changes: Vec<String>,
-    /// Whether force or stiffness were changed and a part of the recording begins within a grasp, whose force and
+    /// `true` if force or stiffness were changed and a part of the recording begins within a grasp, whose force and
     /// stiffness are those that it began with.
     pub began_in_a_grasp: bool,
     /// Ticks in which the recorded hand had torque: what the differences of torques are taken over.
@@ -65,11 +65,11 @@ pub struct OpenLoop {
 }
 
 impl OpenLoop {
-    /// What the comparison is worth.
+    /// The worth of the comparison.
     pub const NOTE: &'static str = "open loop: the counts are the recorded ones; with these parameters the hand would have moved otherwise";
 }
 
-/// How the torque of a joint would have differed.
+/// The change of the torque of a joint.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct JointChange {
     /// Its name.
@@ -88,10 +88,10 @@ pub struct JointChange {
     pub changed_nm: f32,
 }
 
-/// How often a limit acted.
+/// The share of ticks in which a limit acted.
 #[derive(Clone, Debug, Serialize)]
 pub struct LimitShare {
-    /// Which.
+    /// The limit.
     pub limit: &'static str,
     /// Share of the ticks in which it acted on any joint.
     pub recorded: f64,

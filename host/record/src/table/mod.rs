@@ -29,7 +29,7 @@ impl Format {
     }
 }
 
-/// What a column holds.
+/// The kind of a column's values.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
     /// Whole numbers.
@@ -63,25 +63,25 @@ pub enum Cell<'a> {
     Text(String),
 }
 
-/// What is said of a column.
+/// The heading of a column.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Heading<'a> {
     /// Its name.
     pub name: &'a str,
-    /// What it holds.
+    /// The kind of its values.
     pub kind: Kind,
     /// Its unit; empty for what has none.
     pub unit: &'a str,
-    /// What it is.
+    /// Its meaning.
     pub words: &'a str,
 }
 
-/// What a table's rows are made of.
+/// The layout of a table's rows.
 pub trait Layout {
-    /// What a row is made of.
+    /// The data of a row.
     type Row;
 
-    /// What a row is, in a word.
+    /// Returns the name of a row, a word.
     fn row_name(&self) -> &str;
 
     /// The columns.
@@ -109,7 +109,7 @@ pub trait Table<R> {
     fn finish(self: Box<Self>) -> Result<(), TableError>;
 }
 
-/// Why a table can't be written.
+/// The reason for which a table can't be written.
 #[derive(Debug, thiserror::Error)]
 pub enum TableError {
     /// Parquet is a feature, which is off.
@@ -130,7 +130,7 @@ pub enum TableError {
 }
 
 impl TableError {
-    /// Whether the reader of a pipe has seen enough.
+    /// Returns `true` if the reader of a pipe has seen enough.
     pub fn is_broken_pipe(&self) -> bool {
         let is_it = |error: &io::Error| error.kind() == io::ErrorKind::BrokenPipe;
         match self {

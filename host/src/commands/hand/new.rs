@@ -64,7 +64,8 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
     Ok(Outcome::Shown)
 }
 
-/// How a file in a folder names another: relative, unless it was named by an absolute path and is further up.
+/// Returns the name of a file for another in a folder: relative, unless it was named by an absolute path and is further
+/// up.
 fn relative(file: &Path, folder: &Path) -> PathBuf {
     let whole = |folder: Option<&Path>| {
         folder.filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new(".")).canonicalize()

@@ -41,7 +41,7 @@ pub(crate) struct Arguments {
     /// Put a fingertip on a point of the object's surface, m, in the object's frame (may be repeated)
     #[arg(long = "point", value_name = "FINGER=X,Y,Z", allow_hyphen_values = true)]
     points: Vec<String>,
-    /// Where the object's centre of mass is in the hand's base frame, m; without it, where the fingers get to best
+    /// Position of the object's centre of mass in the hand's base frame, m; without it, where the fingers get to best
     #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true)]
     position: Option<String>,
     /// Roll, pitch and yaw of the object, rad; without it, as its file describes it
@@ -111,7 +111,7 @@ fn print(text: &str) -> anyhow::Result<()> {
     io::stdout().lock().write_all(text.as_bytes()).context("cannot print the placement")
 }
 
-/// How a path is given to `sim`, which takes a name without a separator or `.toml` for a built-in one.
+/// Returns a path as `sim` takes it, to which a name without a separator or `.toml` is a built-in one.
 fn shown_path(path: &Path) -> String {
     let text = path.display().to_string();
     if text.ends_with(".toml") || text.contains(['/', '\\']) { text } else { format!("./{text}") }
@@ -184,7 +184,7 @@ fn trunk(settings: &[String]) -> anyhow::Result<BTreeMap<String, f64>> {
         .collect()
 }
 
-/// What the scene calls a hand or an object: a built-in name, or a path relative to the scene's file.
+/// Returns the scene's name for a hand or an object: a built-in name, or a path relative to the scene's file.
 fn reference(name: &str, scene: &Path) -> anyhow::Result<String> {
     if !name.ends_with(".toml") && !name.contains(['/', '\\']) {
         return Ok(name.to_owned());

@@ -114,7 +114,7 @@ pub(super) fn json(placements: &[Placement], path: &Path) -> anyhow::Result<Stri
     Ok(serde_json::to_string(&whole)? + "\n")
 }
 
-/// Why there is none.
+/// Returns the words of a refusal.
 pub(super) fn refusal(refusal: &Refusal, like: &SceneFile) -> String {
     format!("no placement of {} in {}: {refusal}\n", like.object.name, like.hand.name)
 }

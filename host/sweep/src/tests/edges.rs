@@ -1,4 +1,4 @@
-//! Where the grasp begins to fail.
+//! The edges at which the grasp begins to fail.
 
 use super::{super::*, plan};
 use blindgrasp_sim::summary::Summary;

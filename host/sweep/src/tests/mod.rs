@@ -36,7 +36,7 @@ fn runs_are_the_grid_with_the_last_axis_fastest() {
     }
 }
 
-/// What a plan makes of a run is what `sim` makes of the same settings.
+/// The run of a plan is that of `sim` with the same settings.
 #[test]
 fn a_run_is_the_scene_with_its_settings() {
     let plan = plan("cube", &["duration_s=0.1", "seed=7"], &["control.force_n=4,5", "object=cube,cube-2"], 1)

@@ -1,4 +1,4 @@
-//! What comes of runs.
+//! The outcomes of runs.
 
 use super::{super::*, plan};
 use blindgrasp_sim::Simulation;

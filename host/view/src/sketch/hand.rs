@@ -34,8 +34,8 @@ impl Part {
         }
     }
 
-    /// Where it stands in the order from far to near, m: a ball counts from near its front, so that it covers the rods that
-    /// end in it.
+    /// Returns its place in the order from far to near, m: a ball counts from near its front, so that it covers the
+    /// rods that end in it.
     fn nearness(&self, camera: &Camera) -> f64 {
         let bulge = match self {
             Self::Ball { radius_m, .. } => 0.8 * radius_m,

@@ -124,7 +124,7 @@ fn lit(normal: &Vector3<f64>, view: &View) -> Rgb {
     toward(toward(FACE, 0.0, 0.3), 255.0, 0.75 * light.max(0.0))
 }
 
-/// Whether a point lies within outlines, holes left out: a ray from it crosses them an odd number of times.
+/// Returns `true` if a point lies within outlines, holes left out: a ray from it crosses them an odd number of times.
 fn contains(outlines: &[Vec<[f64; 2]>], [x, y]: [f64; 2]) -> bool {
     let crossings = outlines.iter().flat_map(|outline| {
         let next = outline.iter().cycle().skip(1);
@@ -135,7 +135,7 @@ fn contains(outlines: &[Vec<[f64; 2]>], [x, y]: [f64; 2]) -> bool {
     crossed.count() % 2 == 1
 }
 
-/// How large a letter may be to fit into a face, pixels.
+/// Returns the largest size of a letter that fits into a face, pixels.
 fn room(outlines: &[Vec<[f64; 2]>]) -> f64 {
     let span = |k: usize| {
         let along = outlines.iter().flatten().map(|point| point[k]);

@@ -8,7 +8,7 @@ use std::fmt::Write as _;
 /// Fonts that are about as wide as each other, one of which every system has.
 const FONTS: &str = "DejaVu Sans, Verdana, Arial, Helvetica, sans-serif";
 
-/// Which point of a text sits at its place.
+/// The point of a text that sits at its place.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Anchor {
     Start,

@@ -1,4 +1,4 @@
-//! What a fingertip beside the rest of a body may run into.
+//! Parts of a body that a fingertip beside them may run into.
 
 use super::meshes::body;
 use super::*;

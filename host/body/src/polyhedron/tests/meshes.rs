@@ -3,7 +3,7 @@
 use super::*;
 use blindgrasp_meshes::{Mesh, bracket, grid_box, icosphere, plate};
 
-/// What a file gets that says nothing of it: two degrees, and a thousandth of the diagonal.
+/// Returns the tolerances of a file that does not have them: two degrees, and a thousandth of the diagonal.
 fn usual(vertices: &[Vector3<f64>]) -> Flatness {
     Flatness { angle_rad: 2f64.to_radians(), distance_m: 1e-3 * diagonal_m(vertices) }
 }

@@ -1,4 +1,4 @@
-//! What the hand is: the numbers that a check shows, as `--json` prints them.
+//! The facts of a hand: the numbers that a check shows, as `--json` prints them.
 
 use super::meeting::{Meeting, Meetings};
 use super::reach::{Sense, extreme_m};
@@ -59,30 +59,30 @@ pub struct FingertipFacts {
     pub shared_joints: usize,
     /// The largest force towards the other fingertips at the nominal posture, N, and the joint that ends it.
     pub grasping_force_n: Option<f64>,
-    /// That joint.
+    /// The joint that limits it.
     pub limited_by: Option<String>,
     /// The largest force in the direction in which it is weakest, N.
     pub least_force_n: Option<f64>,
 }
 
-/// How far a fingertip's centre gets.
+/// The reach of a fingertip's centre.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Reach {
     /// The fingertip's name.
     pub fingertip: String,
-    /// Where its finger starts, in the base frame at the nominal posture, m.
+    /// The beginning of its finger, in the base frame at the nominal posture, m.
     pub finger_base_m: [f64; 3],
     /// Nearest to there, m, by the finger's own joints.
     pub from_finger_least_m: f64,
     /// Farthest from there, m.
     pub from_finger_most_m: f64,
-    /// What it can't exceed: the sum of the finger's bones, m.
+    /// The bound of the reach: the sum of the finger's bones, m.
     pub finger_length_m: f64,
     /// Nearest to the base's origin, m, by all joints.
     pub from_base_least_m: f64,
     /// Farthest from there, m.
     pub from_base_most_m: f64,
-    /// What it can't exceed: the sum of all bones, m.
+    /// The bound of the reach: the sum of all bones, m.
     pub bones_m: f64,
 }
 
@@ -110,7 +110,7 @@ pub struct MeetingFacts {
     pub centre_m: [f64; 3],
 }
 
-/// Where the fingertips meet; a part is `None` where no such posture was found.
+/// The places where the fingertips meet; a part is `None` where no such posture was found.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct MeetingsFacts {
     /// Around a ball of the size of a fingertip: the most fingertips, if at least two.
@@ -167,12 +167,12 @@ pub(super) fn fingertips(file: &HandFile, specimen: Option<&Specimen>) -> Vec<Fi
     file.fingertips.iter().enumerate().map(facts).collect()
 }
 
-/// How far the fingertips get.
+/// Returns the reach of each fingertip.
 pub(super) fn reaches(specimen: &Specimen) -> Vec<Reach> {
     (0..specimen.fingers()).map(|i| reach(specimen, i)).collect()
 }
 
-/// Where they meet.
+/// Returns the places where they meet.
 pub(super) fn meetings(specimen: &Specimen, meetings: &Meetings) -> MeetingsFacts {
     let facts = |meeting: &Meeting| MeetingFacts {
         fingertips: meeting.fingertips.iter().map(|&i| specimen.file.fingertips[i].name.clone()).collect(),
@@ -200,7 +200,7 @@ fn reach(specimen: &Specimen, i: usize) -> Reach {
     }
 }
 
-/// What the links weigh.
+/// Returns the masses of the links.
 pub(super) fn masses(specimen: &Specimen) -> Masses {
     let mass = |k: usize| specimen.hand.link(k).mass_kg;
     let all = 0..specimen.joints();

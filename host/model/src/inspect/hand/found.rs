@@ -1,4 +1,4 @@
-//! What was found so far, and which values are in doubt because of it.
+//! The findings so far, and the values that are in doubt because of them.
 
 use super::specimen::Specimen;
 use crate::SceneError;
@@ -41,12 +41,12 @@ impl Found {
         self.push(Finding::new(Severity::Error, what, error.remedy).about(subject).key(error.key));
     }
 
-    /// Whether nothing is wrong with these values, of whatever joint or fingertip.
+    /// Returns `true` if nothing is wrong with these values, of whatever joint or fingertip.
     pub(super) fn trusts(&self, keys: &[&str]) -> bool {
         !self.doubted.iter().any(|doubted| keys.iter().any(|key| doubted.ends_with(&format!(".{key}"))))
     }
 
-    /// Whether nothing is wrong with this value of a joint.
+    /// Returns `true` if nothing is wrong with this value of a joint.
     pub(super) fn trusts_joint(&self, specimen: &Specimen, joint: usize, key: &str) -> bool {
         !self.doubted.contains(&specimen.joint_key(joint, key))
     }

@@ -1,4 +1,4 @@
-//! Whether the fingertips can meet: the smallest ball that they can all touch, evenly around their middle.
+//! Meetings of the fingertips: the smallest ball that they can all touch, evenly around their middle.
 //!
 //! The law draws the fingertips to their middle `x_c`. With a ball there, it comes to rest where every centre is at the
 //! ball's radius plus its own from `x_c`: since `x_c` is the mean of the centres, the fingertips then face each other.
@@ -32,7 +32,7 @@ pub(super) struct Meeting {
     pub(super) centre_m: Vector3<f64>,
 }
 
-/// What can be held.
+/// The balls that can be held.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Meetings {
     /// Around a small ball, of the size of a fingertip: the most fingertips, if at least two.
@@ -117,8 +117,8 @@ fn targets(
     Some((middle, fingertips.iter().map(target).collect::<Option<_>>()?))
 }
 
-/// Whether the inverse kinematics of scenes gets there too. The other fingertips stay where they are, and so do those with
-/// too few joints to get to any point, which are there nearly.
+/// Returns `true` if the inverse kinematics of scenes gets there too. The other fingertips stay where they are, and so
+/// do those with too few joints to get to any point, which are there nearly.
 fn is_confirmed(
     specimen: &Specimen,
     fingertips: &[usize],

@@ -15,7 +15,7 @@ const LARGEST: f64 = 1e6;
 
 type Accept = fn(&HandFile) -> Result<Hand, SceneError>;
 
-/// What is refused of a hand's numbers; keys are those of the file.
+/// Returns the refusals of a hand's numbers; keys are those of the file.
 pub(super) fn refused_numbers(file: &HandFile) -> Vec<SceneError> {
     let mut file = file.clone();
     mend_numbers(&mut file, |file| file.prepare(&mut Vec::new()))

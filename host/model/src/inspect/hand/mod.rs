@@ -26,26 +26,26 @@ use specimen::Specimen;
 
 pub use facts::{FingertipFacts, JointFacts, Masses, MeetingFacts, MeetingsFacts, Reach};
 
-/// What a check of a hand found. `--json` prints it.
+/// The findings of a check of a hand. `--json` prints it.
 #[derive(Clone, Debug, Serialize)]
 pub struct HandCheck {
     /// Its name.
     pub name: String,
     /// A sentence or two.
     pub description: String,
-    /// What follows from the findings.
+    /// The verdict that follows from the findings.
     pub verdict: Verdict,
-    /// How many there are.
+    /// The number of findings of each severity.
     pub counts: Counts,
     /// The joint map.
     pub joints: Vec<JointFacts>,
     /// The fingertips.
     pub fingertips: Vec<FingertipFacts>,
-    /// How far they get; empty where the tree is not known.
+    /// The reach of the fingertips; empty where the tree is not known.
     pub reach: Vec<Reach>,
-    /// What the links weigh; `None` where the tree is not known.
+    /// The masses of the links; `None` where the tree is not known.
     pub masses: Option<Masses>,
-    /// Where the fingertips meet; `None` where the tree is not known.
+    /// The places where the fingertips meet; `None` where the tree is not known.
     pub meeting: Option<MeetingsFacts>,
     /// All that was found, the worst first.
     pub findings: Findings,
@@ -128,7 +128,7 @@ impl HandCheck {
     }
 }
 
-/// What is wrong with numbers by themselves, and all that the loader refuses. Gives the hand, if the tree is known.
+/// Finds the faults of single numbers, and all that the loader refuses. Gives the hand, if the tree is known.
 fn examine(file: &HandFile, found: &mut Found) -> Option<Specimen> {
     use rules::numbers::{axes, degrees, lengths, radii, subject_of};
     for rule in [axes, degrees, lengths, radii] {
@@ -197,7 +197,8 @@ fn still(specimen: &Specimen, found: &mut Found) {
     }
 }
 
-/// What no rule knows of: a hand without errors is one that a firmware can be built with, gains or not.
+/// Finds the faults that no rule knows of: a hand without errors is one that a firmware can be built with, gains or
+/// not.
 fn confirm(file: &HandFile, found: &mut Found) {
     if found.findings.iter().any(|finding| finding.severity == super::finding::Severity::Error) {
         return;

@@ -1,4 +1,4 @@
-//! How near to a point, and how far from it, a fingertip gets.
+//! The least and the greatest distance of a fingertip from a point.
 //!
 //! Turned about one joint, a fingertip moves on a circle, whose nearest and farthest points to the given one have a closed
 //! form. Joint after joint is turned to them until nothing is gained (cyclic coordinate descent), from several postures.
@@ -12,13 +12,13 @@ use nalgebra::Vector3;
 const SWEEPS: usize = 200;
 /// Postures that are tried for a start.
 const SAMPLES: usize = 256;
-/// How many of them the search starts from.
+/// The number of them that the search starts from.
 const STARTS: usize = 6;
 
 /// Joint angles of a whole hand, rad.
 pub(super) type Angles = [f64; MAX_JOINTS];
 
-/// Which way to go.
+/// The sense of the search.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Sense {
     Nearest,
@@ -26,7 +26,7 @@ pub(super) enum Sense {
 }
 
 impl Sense {
-    /// Whether the one distance is better than the other.
+    /// Returns `true` if the one distance is better than the other.
     fn prefers(self, a: f64, b: f64) -> bool {
         match self {
             Self::Nearest => a < b,

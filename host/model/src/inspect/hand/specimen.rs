@@ -82,7 +82,8 @@ impl Specimen {
         self.own.iter().position(|own| own.contains(&joint))
     }
 
-    /// Where a finger starts at the nominal posture, m: its first own joint, or its fingertip where it has none.
+    /// Returns the beginning of a finger at the nominal posture, m: its first own joint, or its fingertip where it has
+    /// none.
     pub(super) fn base_m(&self, fingertip: usize) -> Vector3<f64> {
         match self.own[fingertip].first() {
             Some(&first) => self.posture.link(first).origin_m,
@@ -142,9 +143,9 @@ impl Specimen {
         posture.centres_m[..self.fingers()].iter().sum::<Vector3<f64>>() / self.fingers() as f64
     }
 
-    /// How directly a joint moves its fingertip towards the middle of all of them: the cosine between the fingertip's
-    /// velocity and the way there, 1 for a joint that closes the hand when it turns in its positive sense, -1 for one that
-    /// opens it; 0 where there is no way to go.
+    /// Returns how directly a joint moves its fingertip towards the middle of all of them: the cosine between the
+    /// fingertip's velocity and the way there, 1 for a joint that closes the hand when it turns in its positive sense,
+    /// -1 for one that opens it; 0 where there is no way to go.
     pub(super) fn closing(&self, posture: &Posture, joint: usize) -> f64 {
         let Some(finger) = self.finger_of(joint) else { return 0.0 };
         let (tip, pose) = (posture.centres_m[finger], posture.link(joint));

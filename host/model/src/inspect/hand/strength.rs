@@ -1,5 +1,5 @@
-//! What the motors can do at the nominal posture: the largest force of each fingertip, and what the weight of the links and
-//! the law ask of each joint.
+//! The strength of the motors at the nominal posture: the largest force of each fingertip, and what the weight of the
+//! links and the law ask of each joint.
 
 use super::reach::random_angles;
 use super::specimen::Specimen;
@@ -59,7 +59,7 @@ fn column(specimen: &Specimen, fingertip: usize, joint: usize) -> Vector3<f64> {
     pose.axis().cross(&(specimen.posture.centres_m[fingertip] - pose.origin_m))
 }
 
-/// How far a fingertip is from the axis of a joint at the nominal posture, m.
+/// Returns the distance of a fingertip from the axis of a joint at the nominal posture, m.
 pub(super) fn lever_m(specimen: &Specimen, fingertip: usize, joint: usize) -> f64 {
     column(specimen, fingertip, joint).norm()
 }

@@ -1,11 +1,11 @@
-//! What sits on what: everything that the loader refuses of the tree, and the hand where the tree is known.
+//! The tree of a hand: everything that the loader refuses of the tree, and the hand where the tree is known.
 
 use crate::{HandFile, SceneError};
 use blindgrasp_body::Hand;
 
 /// The tree of a file.
 pub(super) struct Structure {
-    /// What is refused; keys are those of the user's file.
+    /// The refusals; keys are those of the user's file.
     pub(super) refused: Vec<SceneError>,
     /// The number of each joint in the user's file, from 1: joints that move no fingertip are taken out of the file.
     pub(super) numbers: Vec<usize>,

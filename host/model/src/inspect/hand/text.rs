@@ -26,7 +26,7 @@ pub(super) fn describe(check: &HandCheck) -> String {
     text.lines().map(|line| one_line(line) + "\n").collect()
 }
 
-/// What sits on what.
+/// Writes the tree of joints.
 fn tree(check: &HandCheck, text: &mut String) {
     text.push_str("base\n");
     branch(check, None, "", text);

@@ -112,7 +112,7 @@ impl Boxes {
     }
 }
 
-/// Whether a ray meets a box before a distance.
+/// Returns `true` if a ray meets a box before a distance.
 fn enters(node: &Node, start: &Vector3<f64>, along: &Vector3<f64>, before: f64) -> bool {
     let (mut from, mut to) = (0.0_f64, before);
     for k in 0..3 {
@@ -123,7 +123,7 @@ fn enters(node: &Node, start: &Vector3<f64>, along: &Vector3<f64>, before: f64) 
     from <= to
 }
 
-/// Where a ray meets a triangle (Moeller and Trumbore).
+/// Returns the distance at which a ray meets a triangle (Moeller and Trumbore).
 fn distance([a, b, c]: &[Vector3<f64>; 3], start: &Vector3<f64>, along: &Vector3<f64>) -> f64 {
     let (ab, ac) = (b - a, c - a);
     let across = along.cross(&ac);

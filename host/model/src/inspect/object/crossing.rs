@@ -1,4 +1,4 @@
-//! Whether a surface cuts through itself.
+//! Surfaces that cut through themselves.
 //!
 //! Two triangles cross when an edge of one passes through the other: the ends of the edge lie on different sides of its plane,
 //! and the line through them passes none of its sides on the wrong hand. Which side a point is on is told by an exact
@@ -19,7 +19,7 @@ pub(super) struct Crossings {
     pub(super) count: usize,
     /// The first two triangles, in the order of their numbers.
     pub(super) first: Option<[usize; 2]>,
-    /// Whether all of them were looked for.
+    /// `true` if all of them were looked for.
     pub(super) is_complete: bool,
 }
 
@@ -40,7 +40,8 @@ pub(super) fn cross([a, b]: [usize; 2], boxes: &Boxes, corners: &[[usize; 3]]) -
     pierces(a, b, boxes, corners) || pierces(b, a, boxes, corners)
 }
 
-/// Whether an edge of one triangle passes through the other. An edge that ends in a corner of the other does not.
+/// Returns `true` if an edge of one triangle passes through the other. An edge that ends in a corner of the other does
+/// not.
 fn pierces(one: usize, other: usize, boxes: &Boxes, corners: &[[usize; 3]]) -> bool {
     let plane = &boxes.triangles[other];
     let are_neighbours = corners[one].iter().any(|k| corners[other].contains(k));

@@ -26,18 +26,18 @@ const MANY_FACES: usize = 200;
 /// The share of its radius that a fingertip may be indented by, for the room that it needs on a face.
 const INDENTED: f64 = 0.1;
 
-/// What a check of an object found. `--json` prints it.
+/// The findings of a check of an object. `--json` prints it.
 #[derive(Clone, Debug, Serialize)]
 pub struct ObjectCheck {
     /// Its name.
     pub name: String,
     /// A sentence or two.
     pub description: String,
-    /// What follows from the findings.
+    /// The verdict that follows from the findings.
     pub verdict: Verdict,
-    /// How many there are.
+    /// The number of findings of each severity.
     pub counts: Counts,
-    /// What it is; `None` where it is no body.
+    /// The facts of the body; `None` where it is no body.
     pub body: Option<BodyFacts>,
     /// Its faces, in their order.
     pub faces: Vec<FaceFacts>,
@@ -51,7 +51,7 @@ pub struct ObjectCheck {
 /// Numbers about a body.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct BodyFacts {
-    /// Whether it has no dent.
+    /// `true` if it has no dent.
     pub convex: bool,
     /// Vertices of its surface.
     pub vertices: usize,
@@ -75,7 +75,7 @@ pub struct BodyFacts {
     pub shortest_edge_m: f64,
     /// Thickness of the thinnest wall, m: from the middle of each triangle straight inwards to the surface opposite.
     pub thinnest_wall_m: f64,
-    /// Where that is, object frame, m.
+    /// The place of the thinnest wall, object frame, m.
     pub thinnest_wall_at_m: [f64; 3],
 }
 
@@ -98,11 +98,11 @@ pub struct FaceFacts {
     pub corners: usize,
     /// Holes.
     pub holes: usize,
-    /// Whether it has no hole and no notch.
+    /// `true` if it has no hole and no notch.
     pub convex: bool,
 }
 
-/// What to look for.
+/// The checks that are wanted.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Wanted {
     /// The unit of a mesh file.
@@ -305,7 +305,7 @@ fn first_vertex(shape: &Polyhedron) -> usize {
 
 type About<'a> = dyn Fn(Severity, String, &str) -> Finding + 'a;
 
-/// Whether its size and its details are those of a thing that a hand grasps.
+/// Finds sizes and details that are not those of a thing that a hand grasps.
 fn size(facts: &BodyFacts, shape: &Polyhedron, about: &About<'_>, findings: &mut Findings) {
     let diagonal = diagonal_m(&shape.vertices_m);
     if !(USUAL_M[0]..=USUAL_M[1]).contains(&diagonal) {
@@ -365,7 +365,7 @@ fn crossing(boxes: &Boxes, corners: &[[usize; 3]], about: &About<'_>, findings: 
     }
 }
 
-/// Whether a fingertip finds room.
+/// Finds faces on which a fingertip has no room.
 fn room(faces: &[FaceFacts], wanted: &Wanted, about: &About<'_>, findings: &mut Findings) {
     let Some(radius) = wanted.fingertip_m else { return };
     // The contact of a sphere that is indented by a share of its radius: r sqrt(2 s - s^2).

@@ -1,4 +1,4 @@
-//! What a check says of objects that are good, odd, and none.
+//! Checks of objects that are good, odd, and none.
 
 use super::*;
 use blindgrasp_meshes::{Mesh, bracket, grid_box, icosphere, plate};

@@ -1,4 +1,4 @@
-//! What is repaired, with its notice, and what is refused, with its place.
+//! Repairs, with their notices, and refusals, with their places.
 
 use super::*;
 use blindgrasp_meshes::{Numbers, grid_box};

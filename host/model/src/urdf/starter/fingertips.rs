@@ -1,4 +1,4 @@
-//! Which links are fingertips, where their spheres are, and how large.
+//! The links that are fingertips, and the places and sizes of their spheres.
 //!
 //! A finger ends with a joint below which none moves. Among the links that this joint carries, a sphere among their shapes, or
 //! `tip` in a name, tells the fingertip. Once one finger is told in this way, ends without are none.
@@ -17,11 +17,11 @@ use nalgebra::Vector3;
 
 /// Radius of a fingertip, as a share of the finger's length: 0.095 for the paper's hand.
 const RADIUS_SHARE: f64 = 0.1;
-/// What is said of that.
+/// The words on that.
 const SHARE: &str = "a tenth of the finger's length";
 /// Smaller spheres are markers, not fingertips: radius, m.
 const MARKER_M: f64 = 2e-3;
-/// What is said of what the user said.
+/// The words on what the user said.
 pub(super) const ASKED: &str = "as asked";
 /// A link whose origin is closer to the joint that carries it does not tell where the finger ends, m.
 const SAME_PLACE_M: f64 = 1e-3;
@@ -35,11 +35,11 @@ pub(super) struct Tip {
     pub(super) offset_m: Vector3<f64>,
     /// Its radius, m; guessed later, if nothing tells it.
     pub(super) radius_m: Option<f64>,
-    /// What tells where it is.
+    /// The origin of its place.
     pub(super) offset_from: &'static str,
-    /// What tells its radius.
+    /// The origin of its radius.
     pub(super) radius_from: &'static str,
-    /// Whether the offset is that of a rod's end, from which the radius has yet to be taken.
+    /// `true` if the offset is that of a rod's end, from which the radius has yet to be taken.
     pub(super) is_end: bool,
 }
 
@@ -82,7 +82,7 @@ fn asked(robot: &Robot, wanted: &FingertipRequest) -> Result<Tip> {
     Ok(Tip { link, offset_m, radius_m, offset_from, radius_from, is_end: false })
 }
 
-/// How far a shape reaches from its link's origin, m.
+/// Returns the farthest distance of a shape from its link's origin, m.
 fn reach(shape: &Shape) -> f64 {
     shape.centre_m.norm() + shape.radius_m
 }
@@ -163,7 +163,7 @@ struct Finger<'a> {
 }
 
 impl Finger<'_> {
-    /// Where a link is in the frame of the joint that carries it.
+    /// Returns the pose of a link in the frame of the joint that carries it.
     fn frame(&self, link: usize) -> Transform {
         self.assembly.seats[link].and_then(|seat| seat.frame).unwrap_or(Transform::identity())
     }

@@ -21,7 +21,7 @@ pub(super) const FRICTION_SHARE: f64 = 0.004;
 /// A fingertip is made to press with at most so many times its finger's weight (4.4 in the paper's experiments), whatever the
 /// torque limits say: many URDFs say too much.
 pub(super) const WEIGHTS: f64 = 10.0;
-/// What is said of the damping gains.
+/// The words on the damping gains.
 pub(super) const DAMPING_RULE: &str = "\
 0.02 of the critical damping 2 sqrt(K H) of each joint alone. H is its inertia,
 #   K = force_n / sum(radius_m) * (1 - 1/fingertips) * lever^2 the stiffness that the law gives it. A joint that moves several
@@ -49,7 +49,7 @@ pub(super) struct Gains {
     pub(super) force_n: f64,
     /// Index of the joint that decides about it.
     pub(super) weakest: usize,
-    /// What that joint would allow, if it is far more than the finger weighs.
+    /// The force that this joint would allow, if it is far more than the finger weighs.
     pub(super) allowed_n: Option<f64>,
     pub(super) attitude_stiffness_nm: f64,
     pub(super) joints: Vec<JointGains>,
@@ -187,7 +187,7 @@ impl Gains {
     }
 }
 
-/// What of a hand the gains follow from. One a joint, if not said otherwise.
+/// The measures of a hand that the gains follow from. One a joint, if not said otherwise.
 struct Measures {
     /// From the joint to the fingertip that it moves furthest, stretched, m.
     reaches_m: Vec<f64>,

@@ -16,7 +16,7 @@ use super::topology::Tree;
 use gains::Gains;
 use std::path::PathBuf;
 
-/// What a hand's file is started from.
+/// The request for a hand's file.
 #[derive(Clone, Debug, Default)]
 pub struct StarterRequest {
     /// The URDF as the hand's file is to name it: relative to [`folder`](Self::folder), or absolute.
@@ -47,9 +47,9 @@ pub struct FingertipRequest {
 pub struct Starter {
     /// The file.
     pub text: String,
-    /// What in it is guessed, and how.
+    /// The guesses in it, with their rules.
     pub guesses: Vec<String>,
-    /// What is odd in the URDF or the hand, in words.
+    /// The oddities of the URDF or the hand, in words.
     pub warnings: Vec<String>,
 }
 

@@ -14,7 +14,7 @@ use super::gains::{self, Gains};
 use std::f64::consts::{FRAC_PI_2, PI};
 use std::fmt::Write as _;
 
-/// What is in a hand's file apart from numbers that hang on the whole hand.
+/// The contents of a hand's file apart from numbers that hang on the whole hand.
 pub(super) struct Draft<'a> {
     pub(super) robot: &'a Robot,
     keys: Keys,
@@ -28,7 +28,7 @@ pub(super) struct Draft<'a> {
     idle: Vec<String>,
 }
 
-/// What the URDF does not say of a joint, or has a placeholder of.
+/// The values of a joint that the URDF does not have, or has placeholders of.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Needs {
     pub(super) torque: bool,
@@ -59,7 +59,7 @@ impl Needs {
     }
 }
 
-/// Whether the URDF knows a joint's friction: it is not zero, and the motor can turn against it.
+/// Returns `true` if the URDF knows a joint's friction: it is not zero, and the motor can turn against it.
 fn has_friction(joint: &Joint) -> bool {
     let torque = joint.limit.effort.filter(|effort| *effort > 0.0).unwrap_or(f64::INFINITY);
     let friction = joint.dynamics.friction.unwrap_or(0.0);
@@ -127,7 +127,7 @@ impl<'a> Draft<'a> {
         if name.trim().is_empty() { "hand".into() } else { name }
     }
 
-    /// What is guessed, a line a kind.
+    /// Returns the guesses, a line a kind.
     pub(super) fn guesses(&self, gains: &Gains) -> Vec<String> {
         let mut guesses = Vec::new();
         match &self.idle[..] {
@@ -261,7 +261,7 @@ impl<'a> Draft<'a> {
         }
     }
 
-    /// What the force follows from.
+    /// Returns the rule that the force follows from.
     fn force_rule(&self, gains: &Gains) -> String {
         match gains.allowed_n {
             Some(allowed) => {

@@ -4,7 +4,7 @@ use super::*;
 use crate::tests::Numbers;
 use std::time::{Duration, Instant};
 
-/// What a piece of a URDF may be replaced by.
+/// Replacements for a piece of a URDF.
 const PIECES: [&str; 24] = [
     "", "<", ">", "/", "\"", "=", " ", "&", "&lt;", "<!--", "-->", "0", "-", "1e400", "nan", "-inf", "1e308",
     "link", "joint", "name", "left-1", "palm", "revolute", "\u{feff}",

@@ -1,4 +1,4 @@
-//! What comes of a URDF that is right.
+//! Hands from URDFs that are right.
 
 use super::super::super::library::{Document, Home};
 use super::super::super::{Scene, read::read, tree::Node};
@@ -171,7 +171,7 @@ fn what_is_odd_is_a_notice() {
     assert_eq!((file.joints[0].torque_limit_nm, file.joints[0].coulomb_friction_nm), (0.3, 0.0));
 }
 
-/// What is wrong with the mass of a link matters only where it moves.
+/// A fault in the mass of a link matters only where it moves.
 #[test]
 fn masses_that_do_not_move_may_be_wrong() {
     let urdf = changed(GRIPPER, "<mass value=\"0.5\"/>", "<mass value=\"nan\"/>");
@@ -191,7 +191,7 @@ fn joints_that_exclude_zero_have_a_nominal_angle_in_their_middle() {
     assert!((file.joints[0].nominal_rad - 0.8).abs() < 1e-15);
 }
 
-/// What is left out of a limit is zero, says URDF.
+/// A bound that is left out of a limit is zero, says URDF.
 #[test]
 fn a_limit_may_have_one_end() {
     let urdf = changed(GRIPPER, "lower=\"-0.8\" upper=\"1.4\"", "lower=\"-0.8\"");

@@ -2,7 +2,7 @@
 
 use super::*;
 
-/// What is wrong in the hand's file.
+/// Faults in the hand's file.
 #[test]
 fn errors_in_the_hand_s_file_name_it() {
     let cases = [

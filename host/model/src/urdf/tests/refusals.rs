@@ -2,7 +2,7 @@
 
 use super::*;
 
-/// What is wrong in the URDF.
+/// Faults in the URDF.
 #[test]
 fn errors_in_the_urdf_say_where_what_and_what_to_do() {
     let cases = [

@@ -44,7 +44,8 @@ pub(in super::super) fn senses(specimen: &Specimen, found: &mut Found) {
     copies(specimen, &stretched, found);
 }
 
-/// Which side of zero a range is on, from -1 to 1 for ranges that have zero at an end, and beyond for those without it.
+/// Returns the side of zero that a range is on, from -1 to 1 for ranges that have zero at an end, and beyond for those
+/// without it.
 fn side(specimen: &Specimen, joint: usize) -> f64 {
     let (lower, upper) = specimen.hand.range_rad(joint);
     (upper + lower) / (upper - lower)

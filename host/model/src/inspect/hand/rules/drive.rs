@@ -78,7 +78,7 @@ pub(in super::super) fn speeds(specimen: &Specimen, found: &mut Found) {
     }
 }
 
-/// How far one count moves the fingertips.
+/// Finds encoders one count of which moves the fingertips too far.
 pub(in super::super) fn encoders(specimen: &Specimen, found: &mut Found) {
     if !found.trusts(&["offset_m"]) {
         return;

@@ -45,7 +45,7 @@ pub(in super::super) fn control(specimen: &Specimen, found: &mut Found) {
     }
 }
 
-/// What `f_d` asks of the joints, fingertips held apart as they are at the nominal posture.
+/// Finds a force `f_d` that asks too much of the joints, fingertips held apart as they are at the nominal posture.
 fn force(
     specimen: &Specimen,
     force_n: f64,

@@ -12,7 +12,8 @@ use std::f64::consts::PI;
 /// All links weigh less than a ball of water that has the length of their finger for a radius; those of a finger of solid
 /// steel, ten times as long as thick, a tenth of that. Written in grams, most weigh more.
 const DENSEST_KG_M3: f64 = 1000.0;
-/// How many times beyond everything on its link a mass may be. A palm is wider than the joints on it are apart.
+/// Largest distance of a mass, as a multiple of that of everything on its link. A palm is wider than the joints on it
+/// are apart.
 const BEYOND: f64 = 2.0;
 /// A link below this, kg and kg m^2, is one without mass: URDFs have such numbers because loaders refuse zeros.
 const NOTHING: f64 = 1e-12;
@@ -147,8 +148,9 @@ fn gyration(specimen: &Specimen, k: usize, most: f64, found: &mut Found) {
     }
 }
 
-/// How far everything on a link is from a point of its frame, m: the joint, those that it carries, its fingertips; a short
-/// link, one that carries a joint right beside its own, may be as large as the bones of the hand are.
+/// Returns the distance of everything on a link from a point of its frame, m: the joint, those that it carries, its
+/// fingertips; a short link, one that carries a joint right beside its own, may be as large as the bones of the hand
+/// are.
 fn size_m(specimen: &Specimen, k: usize, point_m: &Vector3<f64>) -> f64 {
     let (hand, file) = (&specimen.hand, &specimen.file);
     let distance = |place: [f64; 3]| (Vector3::from(place) - point_m).norm();

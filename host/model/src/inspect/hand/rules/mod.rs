@@ -1,5 +1,5 @@
-//! What is looked for. A rule a function, rules of a kind a file; each says in its comment why what it finds is a mistake,
-//! and when it is none.
+//! The rules. A rule a function, rules of a kind a file; each says in its comment why what it finds is a mistake, and
+//! when it is none.
 
 pub(super) mod axes;
 pub(super) mod drive;

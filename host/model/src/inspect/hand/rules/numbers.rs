@@ -14,7 +14,7 @@ const LARGEST_ANGLE_RAD: f64 = TAU * (1.0 + 1e-6);
 const LONGEST_BONE_M: f64 = 3.0;
 /// No bone is so many times as long as the middle one, arm and finger included.
 const LONGEST_BONE: f64 = 40.0;
-/// What bones of fingers look like, m, where there are none to compare with.
+/// Usual length of a finger's bones, m, where there are none to compare with.
 const USUAL_BONE_M: f64 = 0.05;
 /// And their fingertips, in bones.
 const USUAL_RADIUS: f64 = 0.2;
@@ -22,7 +22,7 @@ const USUAL_RADIUS: f64 = 0.2;
 const SPECK: f64 = 1e-3;
 /// A unit that makes a length so many times the usual one, or that part of it, is not what was meant.
 const UNLIKELY: f64 = 4.0;
-/// How far an axis may be from a unit vector: what the loader takes, six digits.
+/// Largest difference of an axis from a unit vector: what the loader takes, six digits.
 const AXIS_TOLERANCE: f64 = 1e-5;
 
 /// Axes have to have length one.
@@ -118,7 +118,7 @@ fn bones(file: &HandFile) -> Vec<(String, f64)> {
     joints.map(keyed("joint")).chain(tips.map(keyed("fingertip"))).collect()
 }
 
-/// What to do about a length that is unlike the usual one: with the unit that it is written in, if one is likely.
+/// Returns the remedy for a length that is unlike the usual one: with the unit that it is written in, if one is likely.
 fn in_metres(value: f64, usual_m: f64) -> String {
     let far = |factor: f64| (value * factor / usual_m).ln().abs();
     let (factor, unit) = if far(1e-3) <= far(1e-2) { (1e-3, "millimetres") } else { (1e-2, "centimetres") };
@@ -141,7 +141,7 @@ fn on_joint(
     Finding::new(severity, what, remedy).about(subject_of(file, &key)).key(key)
 }
 
-/// What a key is about, in words.
+/// Returns the subject of a key, in words.
 pub(in super::super) fn subject_of(file: &HandFile, key: &str) -> String {
     let mut path = key.split('.');
     let (list, number) = (path.next(), path.next());

@@ -26,7 +26,7 @@ pub(in super::super) fn size(specimen: &Specimen, found: &mut Found) {
     }
 }
 
-/// How many joints a fingertip has.
+/// Finds fingertips with too few or too many joints.
 pub(in super::super) fn freedom(specimen: &Specimen, found: &mut Found) {
     for (i, own) in specimen.own.iter().enumerate() {
         let on =
@@ -146,8 +146,8 @@ pub(in super::super) fn overlaps(specimen: &Specimen, found: &mut Found) {
     }
 }
 
-/// Whether bones of two fingers come nearer to each other than a quarter of the smaller fingertip's radius, well within what
-/// any finger is thick. Where fingers start, at their first bones' inner ends, they may share a shaft.
+/// Returns `true` if bones of two fingers come nearer to each other than a quarter of the smaller fingertip's radius,
+/// well within what any finger is thick. Where fingers start, at their first bones' inner ends, they may share a shaft.
 fn cross(specimen: &Specimen, a: usize, b: usize) -> bool {
     let near = 0.25 * specimen.hand.radius_m(a).min(specimen.hand.radius_m(b));
     let (ours, theirs) = (bones(specimen, a), bones(specimen, b));

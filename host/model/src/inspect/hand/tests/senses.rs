@@ -6,7 +6,7 @@ fn turn(joint: &mut crate::file::JointFile) {
     joint.axis = joint.axis.map(|v| 0.0 - v);
 }
 
-/// What is said of axes after one was turned round, by severity and key.
+/// Returns the findings on axes after one was turned round, by severity and key.
 fn told(file: &HandFile) -> Vec<(Severity, String)> {
     let findings = check(file).findings;
     let of_axes = findings.iter().filter(|finding| finding.key.ends_with(".axis"));

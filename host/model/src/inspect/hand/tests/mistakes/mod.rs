@@ -8,9 +8,9 @@ use super::super::HandCheck;
 /// A hand with mistakes.
 struct Case {
     hand: &'static str,
-    /// What is replaced, by what, and how often.
+    /// The replacements: the old text, the new one, and how often it stands there.
     edits: &'static [(&'static str, &'static str, usize)],
-    /// What is found: severity, line, and the rest. The line is the first one with these words in it; the second after
+    /// The findings: severity, line, and the rest. The line is the first one with these words in it; the second after
     /// `2|`, the one before after `^`; nowhere without words.
     found: &'static [(&'static str, &'static str, &'static str)],
 }
