@@ -500,7 +500,7 @@ class Line:
             if alone:
                 fcntl.flock(port, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError:
-            raise BadInput(f"{path} is in use by another program") from None
+            raise BadInput(f"{path} is in use by another program; stop that first") from None
         try:
             settings = termios.tcgetattr(port)
             speed = getattr(termios, "B1000000", None)

@@ -56,7 +56,7 @@ fn main() -> ExitCode {
         Ok(commands::Outcome::Failed) => ExitCode::from(1),
         Err(error) => {
             // A terminal may be gone: nobody to tell, and no reason to panic.
-            let _ = writeln!(io::stderr(), "blindgrasp: {error:#}");
+            let _ = writeln!(io::stderr(), "blindgrasp: {}", commands::in_a_line(&error));
             ExitCode::from(2)
         }
     }

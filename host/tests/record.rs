@@ -117,11 +117,21 @@ fn a_port_in_use_is_refused_and_the_grasp_goes_on() {
     let (link, out) = (folder.path().join("hand"), folder.path().join("a.mcap"));
     let mut hand = serve(&link, &[]);
     let console = grasping(&link);
-    let mut record = Process::start(recorded(&out, &[&link], &["--duration", "1"]));
-    let (code, said, errors) = record.end(PATIENCE);
-    assert_eq!((code, said.as_str()), (Some(2), ""), "{errors}");
-    let who = format!("it is in use by `blindgrasp`, process {}: ", console.0.0.id());
-    assert!(errors.contains(&who) && !out.exists(), "{errors}");
+    // Whatever it is called, and by whatever command it is asked for.
+    let (node, by_id) = (fs::read_link(&link).expect("a link"), folder.path().join("by-id"));
+    std::os::unix::fs::symlink(&link, &by_id).expect("a link");
+    let who = format!("it is in use by `blindgrasp`, process {}; stop that first", console.0.0.id());
+    for port in [&link, &node, &by_id] {
+        let port = port.to_str().expect("UTF-8");
+        let out = out.to_str().expect("UTF-8");
+        for command in [&["record", "--duration", "1", "--out", out][..], &["console"], &["pil", "cube"]] {
+            let mut second = Process::start(blindgrasp(&[command, &["--port", port]].concat()));
+            let (code, said, errors) = second.end(PATIENCE);
+            assert_eq!((code, said.as_str()), (Some(2), ""), "{command:?}: {errors}");
+            assert!(errors.contains(&who) && errors.lines().count() == 1, "{command:?}: {errors}");
+        }
+        assert!(!fs::exists(out).expect("a folder"));
+    }
     assert_still_grasping(console, &mut hand);
     // The port of a program that was killed is free.
     let mut hand = serve(&link, &[]);
@@ -575,6 +585,26 @@ fn misuse_is_told() {
         &["cannot open the serial port /dev/no", "this machine has"],
     );
     refused(&["record", "--out", path, "--port", "a", "--port", "a"], &["one is named twice"]);
+    // A rate wherever there is a port.
+    for command in [&["console"][..], &["monitor"], &["pil", "cube"], &["record", "--out", path]] {
+        refused(
+            &[command, &["--port", "/dev/no", "--baud", "fast"]].concat(),
+            &["invalid value 'fast' for '--baud <BAUD>'"],
+        );
+    }
+    for command in [&["console"][..], &["pil", "cube"], &["record", "--out", path]] {
+        let with = |port| [command, &["--port", port]].concat();
+        let no = "cannot open the serial port /dev/no: there is no such port; this machine has ";
+        refused(&with("/dev/no"), &[no]);
+        for other in ["/dev/null", "/etc/passwd", "/tmp"] {
+            refused(
+                &with(other),
+                &[&format!("serial port {other}: it is no serial port; this machine has ")],
+            );
+        }
+        refused(&with("unix:/no"), &["cannot connect to the socket /no: ", "start the program that listens"]);
+        assert!(!out.exists());
+    }
     refused(&["record", "--out", path, "--port", "a", "--duration", "0"], &["--duration"]);
     refused(&["record", "--out", path, "--port", "a", "--hand", "nobody"], &["nobody"]);
     assert!(!out.exists());
@@ -583,6 +613,8 @@ fn misuse_is_told() {
     let silent = folder.path().join("silent");
     let _listener = std::os::unix::net::UnixListener::bind(&silent).expect("a socket");
     let port = format!("unix:{}", silent.display());
+    let socket = silent.to_str().expect("UTF-8");
+    refused(&["console", "--port", socket], &[&format!("it is a socket: name it as {port}")]);
     refused(&["record", "--out", path, "--port", &port], &["nothing answers within 3 s"]);
     // No longer patience than the recording was to be long.
     refused(
@@ -597,6 +629,9 @@ fn misuse_is_told() {
     fs::write(&out, "mine").expect("a file");
     let port = link.to_str().expect("UTF-8");
     refused(&["record", "--out", path, "--port", port], &["is there already", "--force"]);
+    let node = fs::read_link(&link).expect("a link");
+    let twice = ["it is in use by this program, under another name; name it once"];
+    refused(&["record", "--out", "no.mcap", "--port", port, "--port", node.to_str().expect("UTF-8")], &twice);
     let can = ["--baud 2500000: ", "can't do that; it can do 3000000, 2000000, 1500000, 1000000"];
     refused(&["record", "--out", path, "--port", port, "--force", "--baud", "2500000"], &can);
     assert_eq!(fs::read(&out).expect("the file"), b"mine");

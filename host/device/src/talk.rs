@@ -574,13 +574,24 @@ pub enum LineError {
         can: Wanted,
     },
     /// Nobody listens at a socket.
-    #[error("cannot connect to the socket {}: does somebody listen there?", .path.display())]
+    #[error("cannot connect to the socket {}: {reason}; start the program that listens there first", .path.display())]
     Socket {
         /// Its path.
         path: PathBuf,
-        /// The cause.
-        source: io::Error,
+        /// Why not.
+        reason: io::Error,
     },
+}
+
+impl LineError {
+    /// Whether there is nothing of that name, as when an adapter is unplugged.
+    pub fn is_absence(&self) -> bool {
+        match self {
+            Self::Serial(error) => matches!(error, OpenError::NoSuchPort { .. }),
+            Self::Socket { reason, .. } => reason.kind() == io::ErrorKind::NotFound,
+            Self::NoSuchRate { .. } => false,
+        }
+    }
 }
 
 /// Rates in words, and the first rate, which every line has.
@@ -603,11 +614,19 @@ pub fn wanted_bauds(line: &mut dyn Transport, port: &str, baud: Option<u32>) -> 
     }
 }
 
-/// Opens a line: a serial port, or `unix:PATH`, a socket at which somebody listens, such as QEMU.
+/// Opens a line at the first rate: a serial port, or `unix:PATH`, a socket at which somebody listens, such as QEMU.
 ///
 /// # Errors
 /// If it can't be opened.
 pub fn open(port: &str) -> Result<Box<dyn Transport + Send>, LineError> {
+    open_at(port, FIRST_BAUD)
+}
+
+/// Opens a line at a rate, which a socket does not have.
+///
+/// # Errors
+/// If it can't be opened.
+pub fn open_at(port: &str, baud: u32) -> Result<Box<dyn Transport + Send>, LineError> {
     #[cfg(unix)]
     if let Some(path) = port.strip_prefix("unix:") {
         let connect = || {
@@ -615,8 +634,8 @@ pub fn open(port: &str) -> Result<Box<dyn Transport + Send>, LineError> {
             socket.set_nonblocking(true)?;
             Ok(Streams { from: socket.try_clone()?, to: socket })
         };
-        let socket = connect().map_err(|source| LineError::Socket { path: path.into(), source })?;
+        let socket = connect().map_err(|reason| LineError::Socket { path: path.into(), reason })?;
         return Ok(Box::new(socket));
     }
-    Ok(Box::new(SerialPort::open(Path::new(port))?))
+    Ok(Box::new(SerialPort::open(Path::new(port), baud)?))
 }

@@ -1,7 +1,7 @@
 //! Bytes to a device and back.
 
 use super::interrupt;
-use blindgrasp_shared::link::rate::{FASTER_BAUDS, FIRST_BAUD, Wanted};
+use blindgrasp_shared::link::rate::{FASTER_BAUDS, Wanted};
 use std::io;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
@@ -134,10 +134,19 @@ impl<R: io::Read + std::os::fd::AsFd, W: io::Write + std::os::fd::AsFd> Transpor
     }
 }
 
-/// Returns `true` if the other end is gone.
+/// Whether the other end is gone: a socket's, a pseudo-terminal's, or an adapter that was unplugged.
 fn has_hung_up(error: &io::Error) -> bool {
     use io::ErrorKind::{BrokenPipe, ConnectionReset, UnexpectedEof};
-    matches!(error.kind(), BrokenPipe | ConnectionReset | UnexpectedEof)
+    #[cfg(unix)]
+    let is_unplugged = {
+        use nix::errno::Errno::{EIO, ENODEV, ENXIO};
+        error
+            .raw_os_error()
+            .is_some_and(|code| [EIO, ENODEV, ENXIO].map(|errno| errno as i32).contains(&code))
+    };
+    #[cfg(not(unix))]
+    let is_unplugged = false;
+    is_unplugged || matches!(error.kind(), BrokenPipe | ConnectionReset | UnexpectedEof)
 }
 
 /// Waits until a file can be read or written, or its other end is gone.
@@ -168,8 +177,9 @@ pub struct SerialPort {
     _lock: Lock,
 }
 
-/// The exclusive lock on a port. An advisory one (`flock`), which picocom and pyserial respect, too: that of the terminal
-/// itself (`TIOCEXCL`) does not keep root out, and stays on a pseudo-terminal when the program is killed.
+/// The exclusive lock on a port, under whatever name: it is on the device's node, to which links lead. An advisory one
+/// (`flock`), which picocom, tio and pyserial respect, too: that of the terminal itself (`TIOCEXCL`) does not keep root out, and
+/// stays on a pseudo-terminal when the program is killed; lock files (`/var/lock/LCK..*`) stay, too, and know one name only.
 #[cfg(unix)]
 struct Lock {
     _file: std::fs::File,
@@ -180,27 +190,32 @@ impl Lock {
     /// Takes it.
     ///
     /// # Errors
-    /// If there is no such port, or another program has it: in words, and which one, if that is known.
-    fn take(path: &Path) -> io::Result<Self> {
+    /// If there is no such port, or another program has it.
+    fn take(path: &Path) -> Result<Self, OpenError> {
         use nix::fcntl::OFlag;
         use std::fs::{OpenOptions, TryLockError};
-        use std::os::unix::fs::OpenOptionsExt as _;
+        use std::os::unix::fs::{FileTypeExt as _, OpenOptionsExt as _};
+        let failed = |reason| OpenError::of(path, reason);
+        let kind = std::fs::metadata(path).map_err(failed)?.file_type();
+        if !kind.is_char_device() {
+            return Err(OpenError::no_serial_port(path, kind.is_socket()));
+        }
         // Neither waits for a carrier nor makes it this program's terminal.
         let flags = (OFlag::O_NONBLOCK | OFlag::O_NOCTTY).bits();
-        let file = OpenOptions::new().read(true).write(true).custom_flags(flags).open(path)?;
+        let opened = OpenOptions::new().read(true).write(true).custom_flags(flags).open(path);
+        let file = opened.map_err(failed)?;
         match file.try_lock() {
-            Err(TryLockError::WouldBlock) => {
-                let who = holder(&file).unwrap_or_else(|| "another program".to_owned());
-                let words = format!("it is in use by {who}: end that first");
-                Err(io::Error::new(io::ErrorKind::ResourceBusy, words))
-            }
+            Err(TryLockError::WouldBlock) => Err(OpenError::InUse {
+                path: path.to_owned(),
+                by: holder(&file).unwrap_or(ANOTHER.to_owned()),
+            }),
             // Of a file system without locks nobody is kept out.
             Ok(()) | Err(TryLockError::Error(_)) => Ok(Self { _file: file }),
         }
     }
 }
 
-/// The program that has locked a file, as Linux tells it.
+/// The program that has locked a file, as Linux tells it, and what to do.
 #[cfg(unix)]
 fn holder(file: &std::fs::File) -> Option<String> {
     use std::os::unix::fs::MetadataExt as _;
@@ -216,10 +231,10 @@ fn holder(file: &std::fs::File) -> Option<String> {
         .filter(|words| words.get(5) == Some(&place.as_str()))
         .find_map(|words| words.get(4)?.parse::<u32>().ok().filter(|&process| process > 0))?;
     if process == std::process::id() {
-        return Some("this program itself".to_owned());
+        return Some("this program, under another name; name it once".to_owned());
     }
     let name = std::fs::read_to_string(format!("/proc/{process}/comm")).ok()?;
-    Some(format!("`{}`, process {process}", name.trim_end()))
+    Some(format!("`{}`, process {process}; stop that first", name.trim_end().escape_debug()))
 }
 
 /// Elsewhere a port is exclusive by itself.
@@ -228,18 +243,126 @@ struct Lock;
 
 #[cfg(not(unix))]
 impl Lock {
-    fn take(_path: &Path) -> io::Result<Self> {
+    fn take(_path: &Path) -> Result<Self, OpenError> {
         Ok(Self)
     }
 }
 
-/// The reason for which a serial port could not be opened.
+/// A program of which nothing else is known, and what to do.
+const ANOTHER: &str = "another program; stop that first";
+
+/// Why a serial port could not be opened, and what to do.
 #[derive(Debug, thiserror::Error)]
-#[error("cannot open the serial port {}: {reason}; {}", .path.display(), ports(.known))]
-pub struct OpenError {
-    path: PathBuf,
-    reason: io::Error,
-    known: Vec<PathBuf>,
+pub enum OpenError {
+    /// Another program has it.
+    #[error("cannot open the serial port {}: it is in use by {by}", .path.display())]
+    InUse {
+        /// The port.
+        path: PathBuf,
+        /// Which program, and what to do.
+        by: String,
+    },
+    /// There is none of that name, or not any more.
+    #[error("cannot open the serial port {}: there is no such port; {}", .path.display(), ports(.known))]
+    NoSuchPort {
+        /// The port.
+        path: PathBuf,
+        /// The ports that there are.
+        known: Vec<PathBuf>,
+    },
+    /// It is something else.
+    #[error("cannot open the serial port {}: it is no serial port; {remedy}", .path.display())]
+    NoSerialPort {
+        /// What it is.
+        path: PathBuf,
+        /// What to do.
+        remedy: String,
+    },
+    /// The user has no right to it.
+    #[error("cannot open the serial port {}: you have no right to; {remedy}", .path.display())]
+    NotAllowed {
+        /// The port.
+        path: PathBuf,
+        /// What to do.
+        remedy: String,
+    },
+    /// The adapter can't do the rate.
+    #[error(
+        "cannot open the serial port {}: it can't do {baud} baud, at which the hand begins; take an adapter that can", .path.display()
+    )]
+    NoSuchRate {
+        /// The port.
+        path: PathBuf,
+        /// The rate.
+        baud: u32,
+    },
+    /// Something else.
+    #[error("cannot open the serial port {}: {reason}; {}", .path.display(), ports(.known))]
+    Other {
+        /// The port.
+        path: PathBuf,
+        /// What the operating system says.
+        reason: io::Error,
+        /// The ports that there are.
+        known: Vec<PathBuf>,
+    },
+}
+
+impl OpenError {
+    /// What the operating system says of a port, in terms of what to do.
+    fn of(path: &Path, reason: io::Error) -> Self {
+        use io::ErrorKind::{NotFound, PermissionDenied, ResourceBusy};
+        let path = path.to_owned();
+        match reason.kind() {
+            NotFound => Self::NoSuchPort { path, known: known_ports() },
+            ResourceBusy => Self::InUse { path, by: ANOTHER.to_owned() },
+            // Windows says so of a port in use.
+            PermissionDenied if cfg!(windows) => Self::InUse { path, by: ANOTHER.to_owned() },
+            PermissionDenied => Self::NotAllowed { remedy: right_to(&path), path },
+            _ if is_no_terminal(&reason) => Self::no_serial_port(&path, false),
+            _ => Self::Other { path, reason, known: known_ports() },
+        }
+    }
+
+    fn no_serial_port(path: &Path, is_socket: bool) -> Self {
+        let remedy = match is_socket {
+            true => format!("it is a socket: name it as unix:{}", path.display()),
+            false => ports_in_words(),
+        };
+        Self::NoSerialPort { path: path.to_owned(), remedy }
+    }
+}
+
+/// Whether the operating system says that it is something else than a terminal.
+#[cfg(unix)]
+fn is_no_terminal(error: &io::Error) -> bool {
+    error.raw_os_error() == Some(nix::errno::Errno::ENOTTY as i32)
+}
+
+#[cfg(not(unix))]
+fn is_no_terminal(_error: &io::Error) -> bool {
+    false
+}
+
+/// How to get the right to a port, in words.
+#[cfg(unix)]
+fn right_to(path: &Path) -> String {
+    use std::os::unix::fs::MetadataExt as _;
+    let about = std::fs::metadata(path).ok();
+    let group = about
+        .filter(|about| about.mode() & 0o060 == 0o060 && about.gid() != 0)
+        .and_then(|about| nix::unistd::Group::from_gid(about.gid().into()).ok().flatten());
+    match group {
+        Some(nix::unistd::Group { name, .. }) => format!(
+            "it is for the group `{name}`: `sudo usermod -aG {name} $USER`, then log out and in again"
+        ),
+        None => "its owner may open it: a udev rule can give it to a group, such as `dialout`".to_owned(),
+    }
+}
+
+#[cfg(not(unix))]
+fn right_to(_path: &Path) -> String {
+    "ask whoever administers this machine".to_owned()
 }
 
 /// The serial ports of this machine, in order.
@@ -263,19 +386,22 @@ fn ports(known: &[PathBuf]) -> String {
 }
 
 impl SerialPort {
-    /// Opens a port at the first rate: 8 bits, no parity, one stop bit.
+    /// Opens a port at a rate: 8 bits, no parity, one stop bit.
     ///
     /// # Errors
-    /// Why not, and which ports there are.
-    pub fn open(path: &Path) -> Result<Self, OpenError> {
+    /// Why not, and what to do.
+    pub fn open(path: &Path, baud: u32) -> Result<Self, OpenError> {
         // Locked before its settings are touched, which are the other program's, too.
-        let opened = Lock::take(path).and_then(|_lock| {
-            let port = serial2::SerialPort::open(path, FIRST_BAUD)?;
-            Ok(Self { port, baud: FIRST_BAUD, _lock })
-        });
-        match opened {
-            Ok(port) => Ok(port),
-            Err(reason) => Err(OpenError { path: path.to_owned(), reason, known: known_ports() }),
+        let lock = Lock::take(path)?;
+        let raw = |mut settings: serial2::Settings| {
+            settings.set_raw();
+            Ok(settings)
+        };
+        let port = serial2::SerialPort::open(path, raw).map_err(|reason| OpenError::of(path, reason))?;
+        let mut port = Self { port, baud, _lock: lock };
+        match port.apply(baud) {
+            Ok(()) => Ok(port),
+            Err(_) => Err(OpenError::NoSuchRate { path: path.to_owned(), baud }),
         }
     }
 
@@ -347,6 +473,7 @@ fn is_timeout(error: &io::Error) -> bool {
 #[cfg(all(test, unix))]
 mod tests {
     use super::*;
+    use blindgrasp_shared::link::rate::FIRST_BAUD;
     use std::os::unix::net::UnixStream;
 
     fn pair() -> (Streams<UnixStream, UnixStream>, UnixStream) {
@@ -357,6 +484,40 @@ mod tests {
 
     fn soon() -> Instant {
         Instant::now() + Duration::from_millis(50)
+    }
+
+    #[test]
+    fn a_refusal_of_the_operating_system_is_told_with_what_to_do() {
+        use nix::errno::Errno;
+        use std::os::unix::fs::PermissionsExt as _;
+        let told = |path: &Path, errno: Errno| OpenError::of(path, errno.into()).to_string();
+        let folder = tempfile::TempDir::new().expect("a folder");
+        let path = folder.path().join("port");
+        std::fs::write(&path, "").expect("a file");
+        let mode = |mode| {
+            std::fs::set_permissions(&path, std::fs::Permissions::from_mode(mode)).expect("a mode");
+        };
+        mode(0o600);
+        let words = told(&path, Errno::EACCES);
+        assert!(words.ends_with(": you have no right to; its owner may open it: a udev rule can give it to a group, such as `dialout`"), "{words}");
+        // Of a group that everybody knows, on a file system that takes it.
+        mode(0o660);
+        if std::os::unix::fs::chown(&path, None, Some(1)).is_ok() {
+            let name = nix::unistd::Group::from_gid(1.into())
+                .expect("groups")
+                .map_or(String::new(), |group| group.name);
+            let words = told(&path, Errno::EACCES);
+            assert!(
+                words.ends_with(&format!("`sudo usermod -aG {name} $USER`, then log out and in again")),
+                "{words}"
+            );
+        }
+        let words = told(&path, Errno::EBUSY);
+        assert!(words.ends_with(": it is in use by another program; stop that first"), "{words}");
+        let words = told(&path, Errno::ENOENT);
+        assert!(words.contains(": there is no such port; this machine has "), "{words}");
+        let words = OpenError::NoSuchRate { path, baud: FIRST_BAUD }.to_string();
+        assert!(words.contains(": it can't do 1000000 baud, at which the hand begins; take "), "{words}");
     }
 
     #[test]
@@ -392,7 +553,7 @@ mod tests {
 
     #[test]
     fn a_port_that_is_not_there_is_told_with_those_that_are() {
-        let error = SerialPort::open(Path::new("/dev/no-such-port")).err().unwrap().to_string();
+        let error = SerialPort::open(Path::new("/dev/no-such-port"), FIRST_BAUD).err().unwrap().to_string();
         assert!(error.starts_with("cannot open the serial port /dev/no-such-port: "), "{error}");
         assert!(error.contains("this machine has "), "{error}");
     }

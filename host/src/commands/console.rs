@@ -1,6 +1,6 @@
 //! `blindgrasp console`: words for a hand, and what it answers.
 
-use super::{Outcome, ports};
+use super::{Outcome, in_a_line, ports};
 use anyhow::{Context, anyhow, bail};
 use blindgrasp::device::recorder::{ENDED_ANOTHER, Recorder, Recording};
 use blindgrasp::device::talk::{self, Event, SELDOM, Talk, TalkError, telemetry};
@@ -286,7 +286,7 @@ impl Console {
                 Some(line) => {
                     self.typed.number += 1;
                     match self.execute(&line, now) {
-                        Err(error) if self.typed.by_hand => eprintln!("blindgrasp: {error:#}"),
+                        Err(error) if self.typed.by_hand => eprintln!("blindgrasp: {}", in_a_line(&error)),
                         Err(error) => {
                             let number = self.typed.number;
                             let error = error.context(format!("line {number} of the script, which ends it"));

@@ -35,3 +35,30 @@ pub(crate) enum Outcome {
     /// It ran, and failed to show it (the grasp was lost, bits differ): exit code 1.
     Failed,
 }
+
+/// An error and its causes, in a line; a cause whose words stand there already is not told again.
+pub(crate) fn in_a_line(error: &anyhow::Error) -> String {
+    let mut line = String::new();
+    for words in error.chain().map(ToString::to_string) {
+        if !line.contains(&words) {
+            line += if line.is_empty() { "" } else { ": " };
+            line += &words;
+        }
+    }
+    line
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_error_is_told_once() {
+        let full = || std::io::Error::other("the disk is full");
+        let table = blindgrasp::record::table::TableError::from(full());
+        assert_eq!(in_a_line(&table.into()), "cannot write the table: the disk is full");
+        let error =
+            anyhow::Error::from(full()).context("cannot write a.csv").context("the export has failed");
+        assert_eq!(in_a_line(&error), "the export has failed: cannot write a.csv: the disk is full");
+    }
+}

@@ -7,12 +7,14 @@ use anyhow::bail;
 use blindgrasp::device::build::pil_image;
 use blindgrasp::device::client::{Client, Patience, Traffic};
 use blindgrasp::device::interrupt;
-use blindgrasp::device::transport::{SerialPort, Transport};
+use blindgrasp::device::talk;
+use blindgrasp::device::transport::Transport;
 use blindgrasp::model::{HandModel, Scene};
 use blindgrasp::record::compare::{Comparison, Difference};
 use blindgrasp::rig::pil::{Linked, Pilot, Plan};
 use blindgrasp::sim::Simulation;
 use blindgrasp::sim::summary::Summary;
+use blindgrasp_shared::link::rate::FIRST_BAUD;
 use clap::Args;
 use serde::Serialize;
 use std::io::{self, Write as _};
@@ -48,9 +50,12 @@ pub(crate) struct Arguments {
     /// In QEMU, go through the firmware's driver of the serial port; slower
     #[arg(long, conflicts_with = "port")]
     uart: bool,
-    /// A serial port with a board that runs the image `pil`, and was reset
+    /// A serial port with a board that runs the image `pil`, and was reset; or unix:PATH for a socket at which somebody listens
     #[arg(long, value_name = "PORT")]
-    port: Option<PathBuf>,
+    port: Option<String>,
+    /// Rate of the line, baud, if the board's image was built with another [default: 1000000]
+    #[arg(long, value_name = "BAUD", requires = "port", value_parser = clap::value_parser!(u32).range(1..))]
+    baud: Option<u32>,
     /// The ELF file of the image, in place of one that is built
     #[arg(long, value_name = "ELF", conflicts_with = "port")]
     image: Option<PathBuf>,
@@ -102,7 +107,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
     }
     let plan = Plan::new(&scene).with_context(|| format!("scene {}", scene.name))?;
     let transport = match &arguments.port {
-        Some(port) => Box::new(SerialPort::open(port)?),
+        Some(port) => talk::open_at(port, arguments.baud.unwrap_or(FIRST_BAUD))?,
         None => emulated(&image(arguments, &plan.hand, &scene)?, arguments.uart)?,
     };
     let linked = Linked::connect(&plan, Client::new(transport, Patience::default()))?;

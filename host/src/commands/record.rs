@@ -1,6 +1,6 @@
 //! `blindgrasp record`: everything that one or more hands say, into one file.
 
-use super::{Outcome, ports};
+use super::{Outcome, in_a_line, ports};
 use anyhow::{Context, anyhow, bail};
 use blindgrasp::device::interrupt;
 use blindgrasp::device::recorder::{ENDED_ANOTHER, Recorder, Recording, Totals};
@@ -396,7 +396,11 @@ impl Attendant<'_> {
         while !self.is_over(Instant::now()) {
             let Some(open) = &mut line else {
                 thread::sleep(LOOK_AGAIN);
-                line = talk::open(self.port).ok();
+                match talk::open(self.port) {
+                    Ok(open) => line = Some(open),
+                    Err(error) if error.is_absence() => {}
+                    Err(error) => self.wait_because(&mut told, error.to_string()),
+                }
                 continue;
             };
             match self.listen(&mut **open, &mut cut_at) {
@@ -413,13 +417,12 @@ impl Attendant<'_> {
                     line = None;
                     let now = Instant::now();
                     let since = *cut_at.get_or_insert(now);
-                    let words = format!("{error:#}");
+                    let words = in_a_line(&error);
                     self.recorder.cut(&words, now).map_err(Trouble::File)?;
-                    // Once, not twice a second.
-                    if since == now || words != told {
-                        self.say(format!("{words}; waiting for it to come back"));
+                    if since == now {
+                        told.clear();
                     }
-                    told = words;
+                    self.wait_because(&mut told, words);
                 }
             }
         }
@@ -427,6 +430,14 @@ impl Attendant<'_> {
             self.gaps += since.elapsed();
         }
         Ok(())
+    }
+
+    /// Says why it waits: once, not twice a second.
+    fn wait_because(&self, told: &mut String, words: String) {
+        if *told != words {
+            self.say(format!("{words}; waiting for it to come back"));
+        }
+        *told = words;
     }
 
     /// Until the line is cut.

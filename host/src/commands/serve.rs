@@ -10,6 +10,7 @@ use blindgrasp::rig::serve::{News, Served, serve};
 use blindgrasp::rig::simulated::{Happening, SimulatedHand};
 use blindgrasp_shared::link::rate::FIRST_BAUD;
 use clap::Args;
+use std::fs;
 use std::io::{self, Write as _};
 use std::path::PathBuf;
 
@@ -63,6 +64,15 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
     let mut pty = Pty::open().context("there is no pseudo-terminal")?;
     let port = pty.port().to_owned();
     let made = |path: &PathBuf| {
+        if let Ok(before) = fs::read_link(path)
+            && before != port
+            && before.exists()
+        {
+            let (path, before) = (path.display(), before.display());
+            eprintln!(
+                "blindgrasp: {path} led to {before}, which is still there; from now on it leads to this hand"
+            );
+        }
         Link::new(path, &port).with_context(|| format!("cannot make the symbolic link {}", path.display()))
     };
     let _link = arguments.link.as_ref().map(made).transpose()?;
