@@ -6,6 +6,7 @@
 //! - The **vector table** is at the start of flash, from where the microcontroller boots: the initial stack pointer, then
 //!   the address of the first instruction (Armv7-M Architecture Reference Manual, B1.5.3).
 
+use blindgrasp_wire::printable;
 use blindgrasp_shared::identity::Image;
 use blindgrasp_shared::telemetry::INTERFACE_VERSION;
 use object::elf;
@@ -523,11 +524,6 @@ fn overlap(one: &Range<u64>, other: &Range<u64>) -> bool {
 
 fn damaged(error: impl fmt::Display) -> ImageError {
     ImageError::Damaged(error.to_string())
-}
-
-/// Returns a text from a file, which may be anything: for messages, without control characters.
-fn printable(text: &str) -> String {
-    text.chars().take(60).flat_map(char::escape_default).collect()
 }
 
 fn machine(file: &[u8]) -> Result<Machine, ImageError> {

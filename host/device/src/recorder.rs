@@ -423,9 +423,10 @@ impl Recorder {
 
     /// The file of a firmware's hand, among those that are known.
     fn hand(&self, firmware: &Firmware) -> Option<HandFile> {
-        let names = self.hands.iter().chain([&firmware.hand]);
-        let known = names.filter_map(|name| HandModel::load_with_file(name).ok());
-        known.into_iter().find(|(model, _)| model.hash() == firmware.hand_hash).map(|(_, file)| file)
+        let files = self.hands.iter().map(|file| Some(file.as_str())).chain([None]);
+        let mut known =
+            files.filter_map(|file| HandModel::of_device(file, &firmware.hand, firmware.hand_hash).ok());
+        known.next().map(|(_, file)| file)
     }
 
     fn ask_parameters(&mut self, talk: &mut Talk, now: Instant) {

@@ -453,7 +453,12 @@ impl Talk {
                 if theirs != INTERFACE_VERSION {
                     return Err(TalkError::OtherInterface { theirs });
                 }
-                if self.take_asked(sequence).is_some() {
+                let is_asked = self.asked.iter().any(|asked| {
+                    asked.sequence == sequence && matches!(asked.request, Request::Hello { .. })
+                });
+                if !is_asked {
+                    self.traffic.frames_unexpected += 1;
+                } else if self.take_asked(sequence).is_some() {
                     let (firmware, period_us) = (Firmware::from(&identity), identity.image.period_us);
                     self.open(session, now);
                     self.opening = Some(Event::Open { firmware, period_us, ends_another });
@@ -484,7 +489,8 @@ impl Talk {
             }
             _ => None,
         };
-        if let Some(ms) = heartbeat_ms {
+        // What is no number is no reason to change it.
+        if let Some(ms) = heartbeat_ms.filter(|ms| !ms.is_nan()) {
             self.heartbeat = Duration::from_secs_f32((ms / HEARTBEATS).clamp(1.0, HEARTBEAT_MOST_MS) / 1e3);
             self.due = self.due.min(now + self.heartbeat);
         }
@@ -499,7 +505,8 @@ impl Talk {
             };
             self.rate.answered(asked, self.ms(now));
         }
-        let is_forgotten = answer == Answer::Refused(Refusal::NoSession);
+        // Where there is none, none can be forgotten.
+        let is_forgotten = self.session.is_some() && answer == Answer::Refused(Refusal::NoSession);
         match asker {
             Asker::Talk => {}
             Asker::User => self.events.push_back(Event::Answer(request, answer)),

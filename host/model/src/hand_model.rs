@@ -5,7 +5,7 @@ use super::{
     build::control,
     check::{Result, fail, name, schema},
     controller::Setup,
-    error::{Notice, Place, SceneError},
+    error::{Notice, Place, SceneError, one_line},
     file::{Actuators, HandFile, JointFile, PlantSettings, Sensors},
     hand::{hand, kinematics},
     library::{Document, Kind, is_path},
@@ -54,6 +54,28 @@ impl HandModel {
         let whole = Place::whole(name_or_path);
         let document = Document::open(Kind::Hand, name_or_path, Path::new(""));
         Self::from_document(document.map_err(|error| error.at(&whole))?)
+    }
+
+    /// The hand that a device has been built with, and its file: from `file`, if that is named, else among those built in. The
+    /// name that a device tells is never taken for a path.
+    ///
+    /// # Errors
+    /// Why it is not known, and what to do: one line.
+    pub fn of_device(
+        file: Option<&str>,
+        name: &str,
+        hash: u32,
+    ) -> std::result::Result<(Self, HandFile), String> {
+        let remedy = "name its file with --hand";
+        if file.is_none() && !Kind::Hand.built_in().iter().any(|&(known, _)| known == name) {
+            return Err(format!("the hand `{}` is not built in; {remedy}", one_line(name)));
+        }
+        let file = file.unwrap_or(name);
+        match Self::load_with_file(file) {
+            Ok((hand, file)) if hand.hash() == hash => Ok((hand, file)),
+            Ok(_) => Err(format!("the firmware was built with another hand than `{file}`; {remedy}")),
+            Err(error) => Err(format!("{error}; {remedy}")),
+        }
     }
 
     /// Reads a hand from a text. `source` is its name in errors.

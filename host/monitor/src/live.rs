@@ -360,7 +360,8 @@ impl Follower {
 
     fn greet(&self, firmware: Firmware, period_us: u32, baud: u32, number: Option<u16>) {
         let Firmware { words, hand: hand_name, hand_hash, joint_count, clock_hz, .. } = firmware;
-        let hand = known_hand(self.hand.as_deref(), &hand_name, hand_hash);
+        let hand = HandModel::of_device(self.hand.as_deref(), &hand_name, hand_hash);
+        let hand = hand.map(|(hand, _)| Box::new(hand));
         self.note(Level::Info, format!("a session: {words}"));
         let firmware = words.split(',').next().unwrap_or_default().to_owned();
         let session =
@@ -392,21 +393,6 @@ fn ask_for_everything(firmware: &Firmware, talk: &mut Talk, now: Instant) {
         for index in 0..parameter.count(firmware.joint_count) {
             talk.ask(Request::GetParameter { parameter, index }, now);
         }
-    }
-}
-
-/// The hand that a firmware was built with: from its file, or from those that are built in.
-///
-/// # Errors
-/// Why it is not known, and what to do, in words.
-pub(super) fn known_hand(file: Option<&str>, name: &str, hash: u32) -> Result<Box<HandModel>, String> {
-    let file = file.unwrap_or(name);
-    match HandModel::load(file) {
-        Ok(hand) if hand.hash() == hash => Ok(Box::new(hand)),
-        Ok(_) => {
-            Err(format!("the firmware was built with another hand than `{file}`; name its file with --hand"))
-        }
-        Err(error) => Err(format!("{error}; name the hand's file with --hand")),
     }
 }
 

@@ -514,7 +514,7 @@ impl Model {
             name: hand.and_then(|hand| hand.joint_names.get(joint)).map(String::as_str),
             count,
             angle_rad: count.zip(encoder).map(|(count, encoder)| encoder.angle_rad(count)),
-            range_rad: hand.map(|hand| {
+            range_rad: hand.filter(|hand| joint < hand.hand.joint_count()).map(|hand| {
                 let (lower, upper) = hand.hand.range_rad(joint);
                 (lower as f32, upper as f32)
             }),

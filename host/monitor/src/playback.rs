@@ -4,11 +4,11 @@
 //! are still heard meanwhile.
 
 use super::exchange::Exchange;
-use super::live::known_hand;
 use super::model::{Level, Model, News, Session};
 use blindgrasp_model::HandModel;
 use blindgrasp_record::mcap::{self, About, Decoder, Entries, Entry, Recording, RecordingError, Stamp, What};
 use blindgrasp_shared::link::rate::FIRST_BAUD;
+use blindgrasp_wire::printable;
 use std::path::Path;
 use std::time::{Duration, Instant};
 
@@ -285,8 +285,8 @@ fn session(about: &About, hand: Option<&str>, number: Option<u16>) -> Session {
     let recorded = about.hand_model().filter(|recorded| hand.is_none() && is_right(recorded));
     Session {
         number,
-        firmware: format!("blindgrasp {} ({:08x})", about.firmware_version, about.build_hash),
-        hand_name: about.hand.clone(),
+        firmware: printable(&format!("blindgrasp {} ({:08x})", about.firmware_version, about.build_hash)),
+        hand_name: printable(&about.hand),
         hand_hash: about.hand_hash,
         joint_count: about.joint_count.into(),
         period_us: about.period_us,
@@ -294,7 +294,7 @@ fn session(about: &About, hand: Option<&str>, number: Option<u16>) -> Session {
         baud: about.baud.unwrap_or(FIRST_BAUD),
         hand: match recorded {
             Some(hand) => Ok(Box::new(hand)),
-            None => known_hand(hand, &about.hand, about.hand_hash),
+            None => HandModel::of_device(hand, &about.hand, about.hand_hash).map(|(hand, _)| Box::new(hand)),
         },
     }
 }

@@ -347,7 +347,9 @@ impl<P: Peer> Pilot<P> {
                 // What only a link and a clock can hurt, a scene does not know.
                 if let Parameter::HEARTBEAT_TIME | Parameter::LATE_TICKS = parameter {
                     if let (Parameter::HEARTBEAT_TIME, Some(time_ms)) = (parameter, theirs) {
-                        let ticks = time_ms as u32 * 1000 / self.params.config().period_us / HEARTBEATS;
+                        let ticks = (time_ms as u32).saturating_mul(1000)
+                            / self.params.config().period_us
+                            / HEARTBEATS;
                         self.heartbeat_ticks = Some(ticks.max(1));
                     }
                     continue;

@@ -548,17 +548,11 @@ impl Console {
         say(format_args!("clock: {clock}; started by: {reset}; brown-out reset: {brown_out}"))?;
         say(format_args!("last crash: {crash}"))?;
         self.tell_differences(firmware)?;
-        let file = self.wanted_hand.as_deref().unwrap_or(&firmware.hand);
-        self.hand = match HandModel::load(file) {
-            Ok(hand) if hand.hash() == firmware.hand_hash => Some(hand),
-            Ok(_) => {
-                eprintln!(
-                    "blindgrasp: warning: no angles: the firmware was built with another hand than `{file}`; name its file with --hand"
-                );
-                None
-            }
-            Err(error) => {
-                eprintln!("blindgrasp: warning: no angles: {error}; name the hand's file with --hand");
+        let hand = HandModel::of_device(self.wanted_hand.as_deref(), &firmware.hand, firmware.hand_hash);
+        self.hand = match hand {
+            Ok((hand, _)) => Some(hand),
+            Err(why) => {
+                eprintln!("blindgrasp: warning: no angles: {why}");
                 None
             }
         };

@@ -19,7 +19,7 @@ pub type Sample = message::Sample<MAX_JOINTS>;
 /// The record of a tick.
 pub type Record = telemetry::Record<MAX_JOINTS>;
 
-/// The identity of a firmware.
+/// What a firmware says of itself. Its texts are [printable].
 #[derive(Clone, Debug, PartialEq)]
 pub struct Firmware {
     /// All of it in a line.
@@ -53,9 +53,9 @@ impl From<&Identity<'_>> for Firmware {
         let &Identity { image, clock, reset, crash, brown_out, clock_hz, changed, restored, .. } = identity;
         let is_changed = |parameter: &Parameter| changed & (1 << parameter.number()) != 0;
         Self {
-            words: image.to_string(),
-            kind: image.kind.to_owned(),
-            hand: image.hand.to_owned(),
+            words: printable(&image.to_string()),
+            kind: printable(image.kind),
+            hand: printable(image.hand),
             hand_hash: image.hand_hash,
             joint_count: usize::from(image.joint_count),
             clock,
@@ -118,6 +118,19 @@ pub fn take_encoder(encoders: &mut [Encoder], parameter: Parameter, index: u8, v
 pub fn other_interface(payload: &[u8]) -> Option<u16> {
     let (identity, _, _, theirs) = postcard::take_from_bytes::<(u8, u16, u16, u16)>(payload).ok()?.0;
     (identity == 0 && theirs != INTERFACE_VERSION).then_some(theirs)
+}
+
+/// A text of a device, or of a file, as a terminal may show it: what is no letter, sign or space that can be seen is escaped, and so is
+/// what turns a line around.
+pub fn printable(text: &str) -> String {
+    let mut clean = String::with_capacity(text.len());
+    for c in text.chars() {
+        match c {
+            '\'' | '"' | '\\' => clean.push(c),
+            c => clean.extend(c.escape_debug()),
+        }
+    }
+    clean
 }
 
 /// A request in words.

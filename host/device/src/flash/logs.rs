@@ -1,5 +1,6 @@
 //! Logs of a firmware: defmt frames, decoded with the table in its ELF file.
 
+use blindgrasp_wire::printable;
 use defmt_decoder::{DecodeError, Locations, StreamDecoder, Table};
 use std::fmt;
 use std::path::Path;
@@ -37,13 +38,13 @@ pub struct Line {
 impl fmt::Display for Line {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         if let Some(timestamp) = &self.timestamp {
-            write!(f, "{timestamp} ")?;
+            write!(f, "{} ", printable(timestamp))?;
         }
         write!(f, "{:<5} ", self.level.unwrap_or("print"))?;
         if let Some(location) = &self.location {
             write!(f, "{location}: ")?;
         }
-        write!(f, "{}", self.message)
+        f.write_str(&printable(&self.message))
     }
 }
 
