@@ -549,13 +549,22 @@ mod command {
         (child, folder)
     }
 
-    /// Runs a board as fast as the clock does, for so long or until the host hangs up.
-    fn serve(mut board: Board, mut socket: UnixStream, time: Duration) -> Board {
+    /// Runs a board until the host hangs up.
+    fn serve(board: Board, socket: UnixStream) -> Board {
+        serve_until(board, socket, |_| false)
+    }
+
+    /// Most ticks from one look for what the host says to the next: more than that are not made up for, as if the clock stood still
+    /// as long as the machine has no time. A board whose ticks ran on without the host would take it for gone.
+    const MOST_TICKS: u128 = 20;
+
+    /// Runs a board as fast as the clock does, until it has come so far, the host hangs up, or a minute is over.
+    fn serve_until(mut board: Board, mut socket: UnixStream, is_over: impl Fn(&Board) -> bool) -> Board {
         socket.set_read_timeout(Some(Duration::from_millis(1))).expect("a timeout");
         let begun = Instant::now();
         let mut ticks = 0;
         let mut bytes = [0; 512];
-        while begun.elapsed() < time {
+        while begun.elapsed() < Duration::from_secs(60) && !is_over(&board) {
             match socket.read(&mut bytes) {
                 Ok(count @ 1..) => board.take(&bytes[..count]),
                 Err(error) if matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut) => {}
@@ -567,6 +576,7 @@ mod command {
                     break;
                 }
             }
+            ticks = ticks.max(begun.elapsed().as_millis().saturating_sub(MOST_TICKS));
             while ticks < begun.elapsed().as_millis() {
                 ticks += 1;
                 // Whether the host has hung up, the reading tells.
@@ -584,8 +594,7 @@ mod command {
     /// The same, with the board as it is left.
     fn type_to(board: Board, script: &str) -> (Output, String, String, Board) {
         let (left, board_left) = mpsc::channel();
-        let (mut child, _folder) =
-            start(move |socket| drop(left.send(serve(board, socket, Duration::from_secs(60)))));
+        let (mut child, _folder) = start(move |socket| drop(left.send(serve(board, socket))));
         child.stdin.take().expect("stdin").write_all(script.as_bytes()).expect("the script is taken");
         let (output, said, errors) = ended(child);
         (output, said, errors, board_left.recv().expect("the board"))
@@ -594,9 +603,8 @@ mod command {
     /// The same at a terminal.
     fn type_by_hand(board: Board, lines: &str) -> (Output, String, String) {
         let terminal = nix::pty::openpty(None, None).expect("a terminal");
-        let (child, _folder) = start_with(Stdio::from(terminal.slave), &[], |socket| {
-            drop(serve(board, socket, Duration::from_secs(60)))
-        });
+        let (child, _folder) =
+            start_with(Stdio::from(terminal.slave), &[], |socket| drop(serve(board, socket)));
         let mut keys = std::fs::File::from(terminal.master);
         keys.write_all(lines.as_bytes()).expect("the lines are taken");
         ended(child)
@@ -838,7 +846,7 @@ mod command {
 
     #[test]
     fn one_interrupt_stops_and_the_second_ends() {
-        let (mut child, _folder) = start(|socket| drop(serve(Board::new(), socket, Duration::from_secs(60))));
+        let (mut child, _folder) = start(|socket| drop(serve(Board::new(), socket)));
         let mut stdin = child.stdin.take().expect("stdin");
         stdin.write_all(b"watch 20\narm\n").expect("the script is taken");
         let mut said = BufReader::new(child.stdout.take().expect("stdout")).lines().map_while(Result::ok);
@@ -856,7 +864,7 @@ mod command {
     fn the_hand_is_stopped_whatever_ends_the_command() {
         let (at_the_end, ended) = mpsc::channel();
         let (mut child, _folder) = start(move |socket| {
-            let board = serve(Board::new(), socket, Duration::from_secs(60));
+            let board = serve(Board::new(), socket);
             let _ = at_the_end.send((board.mode, board.fault));
         });
         let mut stdin = child.stdin.take().expect("stdin");
@@ -873,8 +881,8 @@ mod command {
     fn a_script_does_not_go_on_after_a_reset() {
         let (mut child, _folder) = start(|socket| {
             let same = socket.try_clone().expect("a socket");
-            drop(serve(Board::new(), socket, Duration::from_millis(700)));
-            drop(serve(Board::new(), same, Duration::from_secs(60)));
+            drop(serve_until(Board::new(), socket, |board| board.mode == Mode::Armed));
+            drop(serve(Board::new(), same));
         });
         let mut stdin = child.stdin.take().expect("stdin");
         stdin.write_all(b"arm\n").expect("the script is taken");
@@ -887,7 +895,7 @@ mod command {
     #[test]
     fn a_line_that_is_lost_ends_the_command() {
         let (mut child, _folder) =
-            start(|socket| drop(serve(Board::new(), socket, Duration::from_millis(700))));
+            start(|socket| drop(serve_until(Board::new(), socket, |board| board.heartbeats > 3)));
         let _kept_open = child.stdin.take();
         let (output, said, errors) = ended(child);
         assert_eq!(output.status.code(), Some(2));

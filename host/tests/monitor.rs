@@ -81,7 +81,7 @@ struct Terminal {
     is_stuck: Arc<AtomicBool>,
     child: Child,
     /// Keeps the terminal there when the monitor has ended.
-    _kept: std::fs::File,
+    kept: std::fs::File,
 }
 
 impl Terminal {
@@ -120,7 +120,7 @@ impl Terminal {
                 shown.lock().expect("no panic").process(&bytes[..count]);
             }
         });
-        Self { pty, screen, is_stuck, child, _kept: kept }
+        Self { pty, screen, is_stuck, child, kept }
     }
 
     fn watching(hand: &Hand) -> Self {
@@ -195,9 +195,11 @@ impl Terminal {
         });
         let flags = tcgetattr(&*self.pty).expect("a terminal").local_flags;
         assert!(flags.contains(LocalFlags::ECHO | LocalFlags::ICANON | LocalFlags::ISIG), "{flags:?}");
-        // What was printed last is on its way.
-        thread::sleep(Duration::from_millis(50));
-        (status, self.text())
+        // What was printed last is on its way: behind it comes this.
+        const LAST: &str = "-- that is all --";
+        self.kept.write_all(format!("\r\n{LAST}").as_bytes()).expect("the terminal is there");
+        self.wait_for(LAST, |screen| screen.contains(LAST));
+        (status, self.text().replace(LAST, ""))
     }
 
     fn wait_for_screen(&self, what: &str, is_so: impl Fn(&vt100::Screen) -> bool) {

@@ -1,4 +1,6 @@
-//! `blindgrasp record`, `console --out` and `serve` end to end: real processes, a pseudo-terminal, and time that passes.
+//! `blindgrasp record`, `console --out` and `serve` end to end: real processes, a pseudo-terminal, and time that passes. The machine may
+//! have other things to do: what happens is waited for, ticks that the simulated hand gave up are told by it, and what is asserted
+//! of time has room for a process that waits for its turn.
 //!
 //!     cargo test --release -p blindgrasp --test record -- --show-output --include-ignored
 #![cfg(unix)]
@@ -25,10 +27,10 @@ use tempfile::TempDir;
 /// Longest time that a process may take for what takes a moment.
 const PATIENCE: Duration = Duration::from_secs(20);
 
-/// The command. Where that is allowed, it goes before what else this machine does: real time is measured here.
+/// The command.
 fn blindgrasp(arguments: &[&str]) -> Command {
-    let mut command = Command::new("nice");
-    command.args(["-n", "-10", env!("CARGO_BIN_EXE_blindgrasp")]).args(arguments);
+    let mut command = Command::new(env!("CARGO_BIN_EXE_blindgrasp"));
+    command.args(arguments);
     command.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped());
     command
 }
@@ -43,6 +45,18 @@ impl Process {
 
     fn signal(&self, signal: Signal) {
         kill(Pid::from_raw(self.0.id() as i32), signal).expect("a signal");
+    }
+
+    /// What it prints until it has printed this.
+    fn said_until(&mut self, wanted: &str) -> String {
+        let stdout = self.0.stdout.as_mut().expect("stdout");
+        let (mut said, mut byte) = (Vec::new(), [0]);
+        while !said.ends_with(wanted.as_bytes()) {
+            let count = stdout.read(&mut byte).expect("stdout");
+            assert!(count > 0, "no `{wanted}`: {}", String::from_utf8_lossy(&said));
+            said.push(byte[0]);
+        }
+        String::from_utf8(said).expect("UTF-8")
     }
 
     /// Exit code, stdout and stderr at its end.
@@ -82,16 +96,23 @@ impl Drop for Process {
     }
 }
 
-/// A console at a link, whose hand grasps, and the way to type more.
-fn grasping(link: &Path) -> (Process, ChildStdin) {
-    let mut command = blindgrasp(&["console", "--port", link.to_str().expect("UTF-8")]);
+/// A console at a link, and the way to type more.
+fn console(link: &Path, arguments: &[&str]) -> (Process, ChildStdin) {
+    let port = ["console", "--port", link.to_str().expect("UTF-8")];
+    let mut command = blindgrasp(&[&port, arguments].concat());
     command.stdin(Stdio::piped());
     let mut console = Process::start(command);
-    let mut stdin = console.0.stdin.take().expect("stdin");
-    writeln!(stdin, "arm").expect("the line is taken");
-    thread::sleep(Duration::from_millis(500));
-    writeln!(stdin, "grasp").expect("the line is taken");
-    thread::sleep(Duration::from_secs(1));
+    let stdin = console.0.stdin.take().expect("stdin");
+    (console, stdin)
+}
+
+/// The same, whose hand grasps.
+fn grasping(link: &Path) -> (Process, ChildStdin) {
+    let (mut console, mut stdin) = console(link, &[]);
+    writeln!(stdin, "arm\ngrasp").expect("the lines are taken");
+    let said = console.said_until("mode: grasping\n");
+    let modes: Vec<&str> = said.lines().filter(|line| line.starts_with("mode: ")).collect();
+    assert_eq!(modes, ["mode: disarmed", "mode: armed", "mode: grasping"]);
     (console, stdin)
 }
 
@@ -101,10 +122,8 @@ fn assert_still_grasping((mut console, mut stdin): (Process, ChildStdin), hand: 
     drop(stdin);
     let (code, said, errors) = console.end(PATIENCE);
     assert_eq!(code, Some(0), "{said}\n{errors}");
-    let modes: Vec<&str> = said.lines().filter(|line| line.starts_with("mode")).collect();
-    let expected = ["mode: disarmed", "mode: armed", "mode: grasping", "mode       grasping"];
-    // Whether the record after the stop still comes is chance.
-    assert!(modes.starts_with(&expected) && said.contains("stop: done\n"), "{said}\n{errors}");
+    let mode = said.lines().find(|line| line.starts_with("mode"));
+    assert!(mode == Some("mode       grasping") && said.contains("stop: done\n"), "{said}\n{errors}");
     hand.signal(Signal::SIGINT);
     let (code, _, told) = hand.end(PATIENCE);
     assert_eq!((code, told.matches("a grasp begins").count()), (Some(0), 1), "{told}");
@@ -138,7 +157,7 @@ fn a_port_in_use_is_refused_and_the_grasp_goes_on() {
     let (mut console, _stdin) = grasping(&link);
     console.signal(Signal::SIGKILL);
     console.end(PATIENCE);
-    let mut record = Process::start(recorded(&out, &[&link], &["--duration", "1"]));
+    let mut record = Process::start(recorded(&out, &[&link], &["--duration", "3"]));
     assert_eq!(record.end(PATIENCE).0, Some(0));
     hand.signal(Signal::SIGINT);
     hand.end(PATIENCE);
@@ -162,13 +181,15 @@ fn a_served_hand_that_stood_still_keeps_its_grasp_and_says_what_it_missed() {
         .filter_map(|(_, words)| words.strip_suffix(" ticks are missed")?.parse().ok())
         .filter(|&missed| missed > 300)
         .collect();
-    assert_eq!(missed.len(), 3, "{told}");
+    assert!(missed.len() >= 3, "{told}");
+    assert!(missed_in_all(&told) >= missed.iter().sum(), "{told}");
+}
+
+/// Ticks that a hand has given up, because the machine had no time for it, as its last words tell.
+fn missed_in_all(told: &str) -> u64 {
     let summary = told.lines().last().expect("a summary");
-    let all: u64 = (summary.split_once(" late, "))
-        .and_then(|(_, words)| words.split_once(" missed"))
-        .and_then(|(count, _)| count.parse().ok())
-        .expect("a count");
-    assert!(all >= missed.iter().sum(), "{told}");
+    let count = summary.split_once(" late, ").and_then(|(_, words)| words.split_once(" missed"));
+    count.and_then(|(count, _)| count.parse().ok()).expect("a count")
 }
 
 /// A hand that is served at a link, by a line that has time for every record in full.
@@ -245,6 +266,20 @@ fn read(path: &Path) -> Vec<Content> {
     contents
 }
 
+/// What a file that is being written holds of its first device, if there is one yet.
+fn so_far(path: &Path) -> Option<Content> {
+    Recording::open(path).ok()?;
+    read(path).into_iter().next()
+}
+
+fn wait_until(what: &str, mut is_so: impl FnMut() -> bool) {
+    let begun = Instant::now();
+    while !is_so() {
+        assert!(begun.elapsed() < PATIENCE, "waiting until {what}");
+        thread::sleep(Duration::from_millis(200));
+    }
+}
+
 /// The part of the records that has every tick: from the first of two neighbours on.
 fn every_tick(records: &[Decoded]) -> &[Decoded] {
     let begin =
@@ -284,7 +319,7 @@ fn assert_replayed_and_exported(path: &Path, records: &[Decoded]) {
 fn idle_hand(seconds: u32) -> [f64; 2] {
     let folder = TempDir::new().expect("a folder");
     let (link, out) = (folder.path().join("hand"), folder.path().join("idle.mcap"));
-    let hand = serve(&link, &[]);
+    let mut hand = serve(&link, &[]);
     let mut record = Process::start(recorded(&out, &[&link], &["--duration", &seconds.to_string()]));
     let begun = Instant::now();
     let served_s = hand.processor_s();
@@ -292,6 +327,8 @@ fn idle_hand(seconds: u32) -> [f64; 2] {
     let shares =
         [record.processor_s(), hand.processor_s() - served_s].map(|s| s / begun.elapsed().as_secs_f64());
     let (code, said, errors) = record.end(PATIENCE);
+    hand.signal(Signal::SIGINT);
+    let missed = missed_in_all(&hand.end(PATIENCE).2);
     let report: Value = serde_json::from_str(&said).expect("JSON");
     println!(
         "{seconds} s: {} records, none missing; recording takes {:.1} %, serving {:.1} % of a processor",
@@ -307,9 +344,10 @@ fn idle_hand(seconds: u32) -> [f64; 2] {
     assert_whole(&content.records);
     assert_eq!(report["records"].as_u64(), Some(content.records.len() as u64));
     // Everything but the first moments, in which parameters are read.
-    let ticks = every_tick(&content.records).len() as f64;
-    assert!(ticks > 1e3 * f64::from(seconds) - 1500.0, "{ticks} ticks");
-    assert!(content.snapshots.len() as u32 + 2 >= seconds, "{} snapshots", content.snapshots.len());
+    let ticks = every_tick(&content.records).len() as u64;
+    assert!(ticks + missed + 3000 > 1000 * u64::from(seconds), "{ticks} ticks, {missed} missed");
+    let snapshots = content.snapshots.len() as u64;
+    assert!(1000 * (snapshots + 1) >= ticks, "{snapshots} snapshots of {ticks} ticks");
     assert_replayed_and_exported(&out, &content.records);
     // Four times what it is without optimization.
     assert!(cfg!(debug_assertions) || shares[0] < 0.15, "{shares:?}");
@@ -356,20 +394,17 @@ fn a_script_is_recorded_with_its_grasp_a_fault_and_what_was_caught_around_it() {
     let folder = TempDir::new().expect("a folder");
     let (link, out) = (folder.path().join("hand"), folder.path().join("grasp.mcap"));
     let _hand = serve(&link, &["--fail-after", "1.5"]);
-    let (port, path) = (link.to_str().expect("UTF-8"), out.to_str().expect("UTF-8"));
-    let mut command = blindgrasp(&["console", "--port", port, "--out", path]);
-    command.stdin(Stdio::piped());
-    let mut console = Process::start(command);
-    let mut stdin = console.0.stdin.take().expect("stdin");
-    let mut type_and_wait = |line: &str, milliseconds| {
-        writeln!(stdin, "{line}").expect("the line is taken");
-        thread::sleep(Duration::from_millis(milliseconds));
-    };
-    type_and_wait("arm", 1500);
-    // The fault comes, and its 256 records are read out in the 5 s that the line has time for.
-    type_and_wait("grasp", 9000);
-    type_and_wait("clear", 100);
-    type_and_wait("set force_n 4", 1500);
+    let (mut console, mut stdin) = console(&link, &["--out", out.to_str().expect("UTF-8")]);
+    writeln!(stdin, "arm\ngrasp").expect("the lines are taken");
+    console.said_until("fault 1: ");
+    // Its 256 records are read out in the 5 s that the line has time for.
+    wait_until("the burst is read", || so_far(&out).is_some_and(|content| content.burst == 256));
+    writeln!(stdin, "clear\nset force_n 4").expect("the lines are taken");
+    console.said_until("force_n = 4: done\n");
+    let snapshots = so_far(&out).map_or(0, |content| content.snapshots.len());
+    wait_until("a state follows", || {
+        so_far(&out).is_some_and(|content| content.snapshots.len() > snapshots + 1)
+    });
     drop(stdin);
     let (code, said, errors) = console.end(PATIENCE);
     assert_eq!(code, Some(0), "{said}\n{errors}");
@@ -397,11 +432,8 @@ fn signs_and_zeros_that_are_set_are_replayed() {
     let folder = TempDir::new().expect("a folder");
     let (link, out) = (folder.path().join("hand"), folder.path().join("zero.mcap"));
     let _hand = serve(&link, &[]);
-    let (port, path) = (link.to_str().expect("UTF-8"), out.to_str().expect("UTF-8"));
-    let mut command = blindgrasp(&["console", "--port", port, "--out", path]);
-    command.stdin(Stdio::piped());
-    let mut console = Process::start(command);
-    let mut stdin = console.0.stdin.take().expect("stdin");
+    let path = out.to_str().expect("UTF-8");
+    let (mut console, mut stdin) = console(&link, &["--out", path]);
     for (line, milliseconds) in [
         ("status", 1000),
         ("zero 4", 1500),
@@ -420,8 +452,8 @@ fn signs_and_zeros_that_are_set_are_replayed() {
         content.records.iter().filter(|decoded| wanted(&decoded.record)).count()
     };
     let unconfirmed = of(&|record| record.events.contains(Event::Unconfirmed));
-    assert!(unconfirmed > 2000, "{unconfirmed} ticks");
-    assert!(of(&|record| record.mode == Mode::Armed) > 1000);
+    assert!(unconfirmed > 1000, "{unconfirmed} ticks");
+    assert!(of(&|record| record.mode == Mode::Armed) > 500);
     let (code, said, errors) = Process::start(blindgrasp(&["replay", "--json", path])).end(PATIENCE);
     assert_eq!(code, Some(0), "{said}\n{errors}");
     let replay: Value = serde_json::from_str(&said).expect("JSON");
@@ -437,7 +469,7 @@ fn a_hand_that_is_cut_off_is_waited_for_and_another_loses_nothing() {
     let links = ["left", "right"].map(|name| folder.path().join(name));
     let out = folder.path().join("two.mcap");
     let [left, _right] = [&links[0], &links[1]].map(|link| serve(link, &[]));
-    let mut record = Process::start(recorded(&out, &[&links[0], &links[1]], &["--duration", "9"]));
+    let mut record = Process::start(recorded(&out, &[&links[0], &links[1]], &["--duration", "12"]));
     thread::sleep(Duration::from_secs(3));
     left.signal(Signal::SIGKILL);
     drop(left);
@@ -450,12 +482,13 @@ fn a_hand_that_is_cut_off_is_waited_for_and_another_loses_nothing() {
     let report: Value = serde_json::from_str(&said).expect("JSON");
     assert_eq!((&report["whole"], &report["error"]), (&Value::Bool(false), &Value::Null));
     assert_eq!((&report["devices"][0]["gaps"], &report["devices"][1]["gaps"]), (&1.into(), &0.into()));
-    assert!(report["devices"][0]["gaps_s"].as_f64().is_some_and(|s| (0.9..4.0).contains(&s)), "{said}");
+    assert!(report["devices"][0]["gaps_s"].as_f64().is_some_and(|s| (0.9..6.0).contains(&s)), "{said}");
     assert_eq!((&report["devices"][1]["missing"], &report["devices"][1]["sessions"]), (&0.into(), &1.into()));
     let [left, right] = &read(&out)[..] else { panic!("two devices") };
     assert!(!left.damaged && right.gaps.is_empty());
     assert_whole(&right.records);
-    assert!(every_tick(&right.records).len() > 7500, "{}", right.records.len());
+    // Most of the 12 s: it may have given up ticks.
+    assert!(every_tick(&right.records).len() > 6000, "{}", right.records.len());
     let [gap] = left.gaps[..] else { panic!("{:?}", left.gaps) };
     assert_eq!(left.sessions, 2);
     let (before, after) = left.records.split_at(gap);
@@ -617,10 +650,7 @@ fn misuse_is_told() {
     refused(&["console", "--port", socket], &[&format!("it is a socket: name it as {port}")]);
     refused(&["record", "--out", path, "--port", &port], &["nothing answers within 3 s"]);
     // No longer patience than the recording was to be long.
-    refused(
-        &["record", "--out", path, "--port", &port, "--duration", "0.3"],
-        &["nothing answers within 0.3"],
-    );
+    refused(&["record", "--out", path, "--port", &port, "--duration", "0.3"], &["nothing answers within 0."]);
     assert!(!out.exists(), "a file without anything in it");
 
     // A file is not overwritten.
@@ -635,7 +665,7 @@ fn misuse_is_told() {
     let can = ["--baud 2500000: ", "can't do that; it can do 3000000, 2000000, 1500000, 1000000"];
     refused(&["record", "--out", path, "--port", port, "--force", "--baud", "2500000"], &can);
     assert_eq!(fs::read(&out).expect("the file"), b"mine");
-    let mut record = Process::start(recorded(&out, &[&link], &["--force", "--duration", "1"]));
+    let mut record = Process::start(recorded(&out, &[&link], &["--force", "--duration", "3"]));
     assert_eq!(record.end(PATIENCE).0, Some(0));
 }
 
@@ -645,7 +675,7 @@ fn an_interrupt_ends_a_recording_cleanly() {
     let (link, out) = (folder.path().join("hand"), folder.path().join("a.mcap"));
     let hand = serve(&link, &[]);
     let mut record = Process::start(recorded(&out, &[&link], &[]));
-    thread::sleep(Duration::from_secs(2));
+    wait_until("it records", || so_far(&out).is_some_and(|content| content.records.len() > 500));
     record.signal(Signal::SIGINT);
     let (code, said, errors) = record.end(PATIENCE);
     assert_eq!(code, Some(0), "{said}\n{errors}");

@@ -10,12 +10,18 @@ use std::io::{self, ErrorKind, Read as _, Write as _};
 use std::os::unix::fs::symlink;
 use std::path::{Path, PathBuf};
 
+/// Most bytes that wait for a program that does not read for a while, besides the 12 KiB of a pseudo-terminal: what the kernel keeps of
+/// a real port. At 3 Mbaud they are 0.2 s, for which a busy machine may well let a program wait.
+const MOST_WAITING: usize = 1 << 16;
+
 /// The device's end.
 pub struct Pty {
     end: File,
     port: PathBuf,
     /// `true` if a program has opened the port, as far as is known.
     attended: bool,
+    /// What the program has not taken yet.
+    waiting: Vec<u8>,
     lost_bytes: u64,
 }
 
@@ -32,7 +38,7 @@ impl Pty {
         fcntl(&pair.master, FcntlArg::F_SETFL(OFlag::O_NONBLOCK))?;
         let port = ttyname(&pair.slave)?;
         // Only programs hold the other end, so that it is known whether one does.
-        Ok(Self { end: File::from(pair.master), port, attended: false, lost_bytes: 0 })
+        Ok(Self { end: File::from(pair.master), port, attended: false, waiting: Vec::new(), lost_bytes: 0 })
     }
 
     /// Returns the path that a program opens.
@@ -53,23 +59,29 @@ impl Pty {
         }
     }
 
-    /// Sends bytes, if anybody was there when it was last looked whether something came. Nobody waits for a program that
-    /// does not read: what it has no room for is lost, as on a wire.
+    /// Sends bytes, and those that wait, if anybody was there when it was last looked whether something came. Nobody waits for a
+    /// program that does not read: what there is no room for is lost, as on a wire.
     ///
     /// # Errors
     /// If the operating system refuses.
     pub fn send(&mut self, bytes: &[u8]) -> io::Result<()> {
         if !self.attended {
             // They must not wait for the next program.
+            self.waiting.clear();
             return Ok(());
         }
-        let sent = match self.end.write(bytes) {
-            Ok(sent) => sent,
-            Err(error) if is_nobody(&error) => return Ok(()),
-            Err(error) if is_nothing(&error) => 0,
+        let taken = bytes.len().min(MOST_WAITING - self.waiting.len());
+        self.waiting.extend_from_slice(&bytes[..taken]);
+        self.lost_bytes += (bytes.len() - taken) as u64;
+        if self.waiting.is_empty() {
+            return Ok(());
+        }
+        match self.end.write(&self.waiting) {
+            Ok(sent) => drop(self.waiting.drain(..sent)),
+            Err(error) if is_nobody(&error) => self.waiting.clear(),
+            Err(error) if is_nothing(&error) => {}
             Err(error) => return Err(error),
-        };
-        self.lost_bytes += (bytes.len() - sent) as u64;
+        }
         Ok(())
     }
 
@@ -124,5 +136,46 @@ impl Drop for Link {
         if fs::read_link(&self.path).is_ok_and(|port| port == self.port) {
             let _ = fs::remove_file(&self.path);
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::fs::OpenOptions;
+
+    #[test]
+    fn a_program_that_reads_late_gets_what_there_is_room_for_and_the_next_one_nothing() {
+        let mut pty = Pty::open().expect("a pseudo-terminal");
+        let open = |pty: &mut Pty| {
+            let program = OpenOptions::new().read(true).write(true).open(pty.port()).expect("the port");
+            pty.receive(&mut [0; 16]).expect("nothing is wrong");
+            program
+        };
+        let mut program = open(&mut pty);
+        let frame: Vec<u8> = (0..200).collect();
+        for _ in 0..1000 {
+            pty.send(&frame).expect("nothing is wrong");
+        }
+        let (mut read, mut buffer) = (Vec::new(), [0; 4096]);
+        let lost = pty.lost_bytes() as usize;
+        while read.len() < 200_000 - lost {
+            let count = program.read(&mut buffer).expect("bytes");
+            read.extend_from_slice(&buffer[..count]);
+            pty.send(&[]).expect("nothing is wrong");
+        }
+        assert!((MOST_WAITING..MOST_WAITING + (1 << 15)).contains(&read.len()), "{} bytes", read.len());
+        assert!(read.iter().zip(frame.iter().cycle()).all(|(byte, expected)| byte == expected));
+        // What nobody has read is not for the next.
+        for _ in 0..1000 {
+            pty.send(&frame).expect("nothing is wrong");
+        }
+        drop(program);
+        pty.receive(&mut buffer).expect("nothing is wrong");
+        pty.send(&frame).expect("nothing is wrong");
+        let mut program = open(&mut pty);
+        pty.send(b"hello").expect("nothing is wrong");
+        let count = program.read(&mut buffer).expect("bytes");
+        assert_eq!(&buffer[..count], b"hello");
     }
 }

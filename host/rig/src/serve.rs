@@ -121,10 +121,8 @@ pub fn serve(
         let (outputs, happened) = hand.turn(turn);
         line.post(outputs);
         line.send(period, &mut sent);
-        if !sent.is_empty() {
-            pty.send(&sent)?;
-            sent.clear();
-        }
+        pty.send(&sent)?;
+        sent.clear();
         if let Some(happened) = happened {
             tell(served.ticks, News::World(happened));
         }
