@@ -5,11 +5,11 @@
 use blindgrasp::body::MAX_JOINTS;
 use blindgrasp::device::recorder::Recording;
 use blindgrasp::device::talk::{PATIENCE, Talk};
+use blindgrasp::model::HandModel;
 use blindgrasp::monitor::live::{Live, Told};
 use blindgrasp::monitor::model::{Model, Plot};
 use blindgrasp::monitor::view::{self, Palette, Screen, Source};
 use blindgrasp::record::mcap;
-use blindgrasp::model::HandModel;
 use blindgrasp::wire::{Packet, Record, Request, printable};
 use blindgrasp_shared::command::{Command, Grasp, Refusal};
 use blindgrasp_shared::identity::{Clock, Identity, Image};

@@ -6,9 +6,9 @@
 //! - The **vector table** is at the start of flash, from where the microcontroller boots: the initial stack pointer, then
 //!   the address of the first instruction (Armv7-M Architecture Reference Manual, B1.5.3).
 
-use blindgrasp_wire::printable;
 use blindgrasp_shared::identity::Image;
 use blindgrasp_shared::telemetry::INTERFACE_VERSION;
+use blindgrasp_wire::printable;
 use object::elf;
 use object::read::elf::{ElfFile32, FileHeader, ProgramHeader};
 use object::{Endianness, FileKind, Object, ObjectSymbol};

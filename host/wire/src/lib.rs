@@ -19,7 +19,7 @@ pub type Sample = message::Sample<MAX_JOINTS>;
 /// The record of a tick.
 pub type Record = telemetry::Record<MAX_JOINTS>;
 
-/// What a firmware says of itself. Its texts are [printable].
+/// The identity of a firmware. Its texts are [printable].
 #[derive(Clone, Debug, PartialEq)]
 pub struct Firmware {
     /// All of it in a line.
