@@ -20,7 +20,7 @@ macro_rules! not_built {
                 pub(crate) fn run(_: &Arguments) -> anyhow::Result<Outcome> {
                     anyhow::bail!(concat!(
                         "this build has no `", stringify!($name), "`; build it in: `cargo run --release --features ",
-                        $feature, " -- ", stringify!($name), "` and the same arguments"
+                        $feature, " -- ", stringify!($name), "` and the same arguments (`--features full` has all but `flash`)"
                     ))
                 }
             }
