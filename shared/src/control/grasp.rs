@@ -126,11 +126,14 @@ impl<T: Real, const J: usize, const F: usize> Law<T, J, F, 2, 0> for GraspLaw<T>
             ([Vector3::zeros(); F], T::zero())
         };
         let stiffness = self.approach_stiffness_n_m(force_n);
+        let centroid = self.centroid_m(hand, posture);
         let mut squares = T::zero();
-        for (i, (away, moment_nm)) in self.centroid_offsets(hand, posture).zip(moments_nm).enumerate() {
+        let fingertips = hand.prepared_fingertips().iter().zip(&posture.centres_m);
+        for ((fingertip, centre), moment_nm) in fingertips.zip(moments_nm) {
+            let away = centroid - centre;
             squares += dot(&away, &away);
             let wrench = Wrench { force_n: away * stiffness, moment_nm };
-            hand.push_fingertip(posture, i, &wrench, torques_nm);
+            hand.push(posture, fingertip.link, centre, &wrench, torques_nm);
         }
         let approach_potential_j = squares * stiffness * T::from_f64(0.5);
         Effect { potentials_j: [approach_potential_j, attitude_potential_j], signals: [] }
@@ -151,8 +154,9 @@ impl<T: Real> GraspLaw<T> {
         force_n: T,
     ) -> [Wrench<T>; F] {
         let mut wrenches = [Wrench::zero(); F];
-        for (wrench, away) in wrenches.iter_mut().zip(self.centroid_offsets(hand, posture)) {
-            wrench.force_n = away * self.approach_stiffness_n_m(force_n);
+        let (stiffness, centroid) = (self.approach_stiffness_n_m(force_n), self.centroid_m(hand, posture));
+        for (wrench, centre) in wrenches.iter_mut().zip(&posture.centres_m).take(hand.fingertip_count()) {
+            wrench.force_n = (centroid - centre) * stiffness;
         }
         wrenches
     }
@@ -169,16 +173,15 @@ impl<T: Real> GraspLaw<T> {
         moments_nm.map(|moment_nm| Wrench { force_n: Vector3::zeros(), moment_nm })
     }
 
-    /// Returns what leads from the centre of each fingertip to the centroid (Eq. 31), m. The potential of Eq. 43 is `A / 2`
-    /// times the sum of their squares.
-    fn centroid_offsets<'a, const J: usize, const F: usize>(
+    /// Returns the centroid of the fingertips' centres (Eq. 31), m. The potential of Eq. 43 is `A / 2` times the sum of the
+    /// squares of what leads there from each.
+    fn centroid_m<const J: usize, const F: usize>(
         &self,
         hand: &Hand<T, J, F>,
-        posture: &'a Posture<T, J, F>,
-    ) -> impl Iterator<Item = Vector3<T>> + use<'a, T, J, F> {
+        posture: &Posture<T, J, F>,
+    ) -> Vector3<T> {
         let centres = posture.centres_m.iter().take(hand.fingertip_count());
-        let centroid = centres.clone().fold(Vector3::zeros(), |sum, centre| sum + centre) * self.share_of_one;
-        centres.map(move |centre| centroid - centre)
+        centres.fold(Vector3::zeros(), |sum, centre| sum + centre) * self.share_of_one
     }
 }
 

@@ -104,14 +104,16 @@ impl<T: Real> Bend<T> {
         )
     }
 
-    /// The new axes in whatever axes the old ones are given.
+    /// Sets the new axes in whatever axes the old ones are given: row by row, where they stay, because nine numbers at a time
+    /// are more than the tick has registers for.
     #[inline]
-    pub(super) fn turn_axes(self, old: &Matrix3<T>) -> Matrix3<T> {
-        let row = |x: T, y: T, z: T| self.into_new(&Vector3::new(x, y, z));
-        let x = row(old.m11, old.m12, old.m13);
-        let y = row(old.m21, old.m22, old.m23);
-        let z = row(old.m31, old.m32, old.m33);
-        Matrix3::new(x.x, x.y, x.z, y.x, y.y, y.z, z.x, z.y, z.z)
+    pub(super) fn turn_axes(self, old: &Matrix3<T>, new: &mut Matrix3<T>) {
+        for row in 0..3 {
+            let turned = self.into_new(&Vector3::new(old[(row, 0)], old[(row, 1)], old[(row, 2)]));
+            new[(row, 0)] = turned.x;
+            new[(row, 1)] = turned.y;
+            new[(row, 2)] = turned.z;
+        }
     }
 }
 

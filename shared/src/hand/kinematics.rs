@@ -136,14 +136,20 @@ impl<T: Real, const J: usize, const F: usize> Hand<T, J, F> {
                 }
                 Some(bend) => {
                     angle = angles_rad[k];
-                    let (axes, origin_m) = match joint.parent.and_then(|parent| posture.at(parent)) {
-                        Some((parent, axes)) => {
+                    // The chain of the parent, which comes before, began before.
+                    let (begun, axes) = posture.chains.split_at_mut(k);
+                    let parent = joint.parent.and_then(|parent| posture.joints.get(parent));
+                    let origin_m = match parent.and_then(|parent| Some((parent, begun.get(parent.chain)?))) {
+                        Some((parent, old)) => {
                             let bend = bend.after(parent.sine, parent.cosine);
-                            (bend.turn_axes(axes), bend.into_new(&parent.origin_m) + joint.offset_m)
+                            bend.turn_axes(old, &mut axes[0]);
+                            bend.into_new(&parent.origin_m) + joint.offset_m
                         }
-                        None => (bend.axes(), joint.offset_m),
+                        None => {
+                            axes[0] = bend.axes();
+                            joint.offset_m
+                        }
                     };
-                    posture.chains[k] = axes;
                     (k, origin_m)
                 }
             };
@@ -182,8 +188,9 @@ impl<T: Real, const J: usize, const F: usize> Hand<T, J, F> {
     /// Joint torques that put wrenches on the fingertips, `sum(J_i^T F_i + J_Omega i^T M_i)`, N m.
     pub fn fingertip_torques(&self, posture: &Posture<T, J, F>, wrenches: &[Wrench<T>; F]) -> [T; J] {
         let mut torques = [T::zero(); J];
-        for (i, wrench) in wrenches.iter().enumerate().take(self.fingertip_count) {
-            self.push_fingertip(posture, i, wrench, &mut torques);
+        let fingertips = self.prepared_fingertips().iter().zip(&posture.centres_m);
+        for ((fingertip, centre), wrench) in fingertips.zip(wrenches) {
+            self.push(posture, fingertip.link, centre, wrench, &mut torques);
         }
         torques
     }
@@ -195,21 +202,21 @@ impl<T: Real, const J: usize, const F: usize> Hand<T, J, F> {
         torques
     }
 
-    /// Adds the joint torques that put a wrench on one fingertip, without forming a Jacobian: from the fingertip to the
-    /// base, it is projected on the plane of each chain, where all joints see the same force and the same moment
-    /// about the base's origin.
+    /// Adds the joint torques that put a wrench on a link, at a point in the base frame, m, without forming a Jacobian: from
+    /// the link to the base, it is projected on the plane of each chain, where all joints see the same force and the same
+    /// moment about the base's origin.
     #[inline]
-    pub(crate) fn push_fingertip(
+    pub(crate) fn push(
         &self,
         posture: &Posture<T, J, F>,
-        fingertip: usize,
+        link: usize,
+        point_m: &Vector3<T>,
         wrench: &Wrench<T>,
         torques: &mut [T; J],
     ) {
-        let Some(centre) = posture.centres_m.get(fingertip) else { return };
         let force = &wrench.force_n;
-        let moment = wrench.moment_nm + cross(centre, force);
-        let mut link = Some(self.fingertip_link(fingertip));
+        let moment = wrench.moment_nm + cross(point_m, force);
+        let mut link = Some(link);
         while let Some((last, (pose, axes))) = link.and_then(|last| Some((last, posture.at(last)?))) {
             let (x, y) = (dot(&x_axis(axes), force), dot(&y_axis(axes), force));
             let z = dot(&z_axis(axes), &moment);
@@ -232,32 +239,36 @@ impl<T: Real, const J: usize, const F: usize> Hand<T, J, F> {
         torques: &mut [T; J],
     ) -> T {
         let upwards = -gravity_m_s2;
-        // In the axes of each joint's chain.
-        let mut moments: [Vector3<T>; J] =
-            core::array::from_fn(|k| posture.joints[k].turned(&self.joints[k].first_moment_kg_m));
+        let upwards_in_plane = |joint: usize| match posture.at(joint) {
+            Some((_, axes)) => (dot(&x_axis(axes), &upwards), dot(&y_axis(axes), &upwards)),
+            None => (T::zero(), T::zero()),
+        };
+        // In the axes of the joint's chain, as are all moments.
+        let own = |joint: usize| posture.joints[joint].turned(&self.joints[joint].first_moment_kg_m);
+        // Of a joint on which other chains stand, with what these have: few, so that the others need not be kept.
+        let mut carrying: [Option<Vector3<T>>; J] = [None; J];
+        let count = self.joint_count.min(J);
+        let (mut x, mut y) = upwards_in_plane(count.wrapping_sub(1));
+        let mut moment = Vector3::zeros();
         let mut potential_j = T::zero();
-        let mut end = self.joint_count.min(J);
-        while let Some((_, axes)) = end.checked_sub(1).and_then(|last| posture.at(last)) {
-            let (x, y) = (dot(&x_axis(axes), &upwards), dot(&y_axis(axes), &upwards));
-            let mut moment = Vector3::zeros();
-            for k in (0..end.min(J)).rev() {
-                moment += moments[k];
-                torques[k] += moment.x * y - moment.y * x;
-                end = k;
-                let joint = &self.joints[k];
-                if let Some(bend) = &joint.bend {
-                    let parent = joint.parent.unwrap_or(J);
-                    match (posture.joints.get(parent), moments.get_mut(parent)) {
-                        (Some(pose), Some(below)) => {
-                            *below += bend.after(pose.sine, pose.cosine).into_old(&moment);
-                        }
-                        _ => {
-                            potential_j +=
-                                moment.x * x + moment.y * y + moment.z * dot(&z_axis(axes), &upwards);
-                        }
+        for k in (0..count).rev() {
+            moment += carrying[k].unwrap_or_else(|| own(k));
+            torques[k] += moment.x * y - moment.y * x;
+            let joint = &self.joints[k];
+            if let Some(bend) = &joint.bend {
+                let parent = joint.parent.unwrap_or(J);
+                match (posture.joints.get(parent), carrying.get_mut(parent)) {
+                    (Some(pose), Some(below)) => {
+                        *below.get_or_insert_with(|| own(parent)) +=
+                            bend.after(pose.sine, pose.cosine).into_old(&moment);
                     }
-                    break;
+                    _ => {
+                        let z = dot(&z_axis(&posture.chains[k]), &upwards);
+                        potential_j += moment.x * x + moment.y * y + moment.z * z;
+                    }
                 }
+                moment = Vector3::zeros();
+                (x, y) = upwards_in_plane(k.wrapping_sub(1));
             }
         }
         potential_j

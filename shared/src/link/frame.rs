@@ -35,20 +35,18 @@ pub fn encode<'a, M: Serialize + ?Sized>(
 fn stuff(buffer: &mut [u8], mut end: usize) -> Result<&[u8], BufferTooSmall> {
     let mut code_at = 0;
     loop {
-        // A code, and as many bytes as it can count.
+        // A code, and as many bytes as it can count. Every zero among them becomes the code of those behind it.
         let window_end = end.min(code_at + usize::from(FULL));
-        let window = buffer.get_mut(code_at..window_end).ok_or(BufferTooSmall)?;
-        let (mut code, bytes) = window.split_first_mut().ok_or(BufferTooSmall)?;
-        let mut length = 1_u8;
-        for byte in bytes {
-            if *byte == 0 {
-                *code = length;
-                (code, length) = (byte, 1);
-            } else {
-                length += 1;
-            }
-        }
-        *code = length;
+        let mut rest = buffer.get_mut(code_at..window_end).ok_or(BufferTooSmall)?;
+        let length = loop {
+            let (code, bytes) = rest.split_first_mut().ok_or(BufferTooSmall)?;
+            let Some(zero) = bytes.iter().position(|byte| *byte == 0) else {
+                *code = bytes.len() as u8 + 1;
+                break *code;
+            };
+            *code = zero as u8 + 1;
+            rest = &mut bytes[zero..];
+        };
         if window_end == end {
             // A full block at the end has no other behind it.
             break;
