@@ -23,6 +23,7 @@ use std::path::{Path, PathBuf};
 /// The hand whose firmware is measured if no scene says otherwise.
 const BENCH_SCENE: &str = "cube";
 /// The firmware's measurements: key, and what it is.
+#[cfg(unix)]
 const FIGURES: [(&str, &str); 6] = [
     ("law_gravity_off", "grasp law without gravity compensation"),
     ("law_gravity_on", "grasp law with gravity compensation"),
