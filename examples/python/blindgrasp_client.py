@@ -158,7 +158,7 @@ class Reader:
 
 def varint(value, bits):
     if not 0 <= value < 1 << bits:
-        raise Malformed(f"{value} is no number of {bits} bits")
+        raise Malformed(f"{value} is not a number of {bits} bits")
     out = bytearray()
     while value > 0x7F:
         out.append(value & 0x7F | 0x80)
@@ -512,7 +512,7 @@ class Line:
             termios.tcsetattr(port, termios.TCSANOW, settings)
             termios.tcflush(port, termios.TCIFLUSH)
         except termios.error as error:
-            raise BadInput(f"{path} is no serial port: {error.args[-1]}") from None
+            raise BadInput(f"{path} is not a serial port: {error.args[-1]}") from None
         return port
 
     @classmethod

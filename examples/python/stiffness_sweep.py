@@ -164,7 +164,7 @@ def number(least, open_end=False):
         value = float(text)
         if not (math.isfinite(value) and (value > least if open_end else value >= least)):
             words = "above" if open_end else "at least"
-            raise argparse.ArgumentTypeError(f"{text} is no number that is {words} {least:g}")
+            raise argparse.ArgumentTypeError(f"{text} is not a number that is {words} {least:g}")
         return value
 
     parse.__name__ = "number"

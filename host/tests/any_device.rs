@@ -416,7 +416,7 @@ fn commands_end_in_order_whatever_a_device_says() {
     assert!(greeted > said.len() / 4, "{greeted} of {}: {said:#?}", said.len());
 }
 
-/// A name that a device tells is no path: what stands there is not even looked at.
+/// A name that a device tells is not a path: what stands there is not even looked at.
 #[test]
 fn a_hand_s_name_is_not_taken_for_a_path() {
     let folder = TempDir::new().expect("a folder");

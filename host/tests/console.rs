@@ -743,8 +743,8 @@ mod command {
         ];
         assert_lines(&said, &lines);
         let wanted = [
-            "blindgrasp: `graps` is no command: did you mean `grasp`?",
-            "blindgrasp: `force_m` is no parameter: did you mean `force_n`?",
+            "blindgrasp: `graps` is not a command: did you mean `grasp`?",
+            "blindgrasp: `force_m` is not a parameter: did you mean `force_n`?",
             "blindgrasp: `x` is not a number",
             "blindgrasp: use: set KEY [INDEX] VALUE: ",
             "blindgrasp: watch: `1` is neither `off` nor whole milliseconds",
@@ -768,7 +768,7 @@ mod command {
         assert_eq!(output.status.code(), Some(2), "{errors}");
         assert_lines(&said, &["arm: done", "stop: done"]);
         assert!(!said.contains("grasp:"), "{said}");
-        let wanted = "line 2 of the script, which ends it: `graps` is no command: did you mean `grasp`?";
+        let wanted = "line 2 of the script, which ends it: `graps` is not a command: did you mean `grasp`?";
         assert!(errors.ends_with(&format!("{wanted}\n")) && errors.lines().count() == 1, "{errors}");
     }
 

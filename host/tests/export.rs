@@ -242,7 +242,7 @@ fn of_a_damaged_recording_what_can_be_read_is_exported() {
     assert_eq!(output.status.code(), Some(1), "{}", told(&output));
     let (_, rows) = csv_rows(&output.stdout);
     assert!(!rows.is_empty() && (rows.len() as u64) < arrived, "{}", rows.len());
-    std::fs::write(&path, b"this is no recording, and never was one").unwrap();
+    std::fs::write(&path, b"this is not a recording, and never was one").unwrap();
     assert_eq!(command(&path, &["--to", "csv", "--out", "-"]).status.code(), Some(2));
 }
 

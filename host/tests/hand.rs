@@ -151,11 +151,11 @@ fn mistakes_are_one_line() {
         ),
         (
             &["hand", "export", "a.urdf", "--urdf"],
-            "blindgrasp: a.urdf: a URDF alone is no hand: it has no fingertips and gains; `blindgrasp hand new a.urdf` writes a hand's file that names it",
+            "blindgrasp: a.urdf: a URDF alone is not a hand: it has no fingertips and gains; `blindgrasp hand new a.urdf` writes a hand's file that names it",
         ),
         (
             &["sim", "cube", "--set", "hand=a.urdf"],
-            "blindgrasp: --set: hand: a URDF alone is no hand: it has no fingertips and gains; `blindgrasp hand new a.urdf` writes a hand's file that names it",
+            "blindgrasp: --set: hand: a URDF alone is not a hand: it has no fingertips and gains; `blindgrasp hand new a.urdf` writes a hand's file that names it",
         ),
         (
             &["hand", "export", "three-fingers", "--urdf"],

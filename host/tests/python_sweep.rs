@@ -70,8 +70,8 @@ fn bad_input_is_told_in_a_line() {
             COMMAND,
             "cannot write /no/folder/rows.csv",
         ),
-        (&["cube", "--force", "0"], COMMAND, "0 is no number that is above 0"),
-        (&["cube", "--stiffness", "nan"], COMMAND, "nan is no number that is at least 0"),
+        (&["cube", "--force", "0"], COMMAND, "0 is not a number that is above 0"),
+        (&["cube", "--stiffness", "nan"], COMMAND, "nan is not a number that is at least 0"),
         (&["cube", "--jobs", "0"], COMMAND, "--jobs has to be at least 1"),
     ] {
         let (code, _, err) = sweep(arguments, command);

@@ -632,7 +632,7 @@ fn misuse_is_told() {
         for other in ["/dev/null", "/etc/passwd", "/tmp"] {
             refused(
                 &with(other),
-                &[&format!("serial port {other}: it is no serial port; this machine has ")],
+                &[&format!("serial port {other}: it is not a serial port; this machine has ")],
             );
         }
         refused(&with("unix:/no"), &["cannot connect to the socket /no: ", "start the program that listens"]);

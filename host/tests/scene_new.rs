@@ -179,7 +179,7 @@ fn bad_input_has_exit_code_2() {
         "there is no fingertip `finger-9`; did you mean `finger-",
     );
     folder.refused(&["three-finger", "cube", "--face", "0=1"], "there is no fingertip `0`");
-    folder.refused(&["three-finger", "cube", "--face", "1=top"], "`top` is no number of a face");
+    folder.refused(&["three-finger", "cube", "--face", "1=top"], "`top` is not a number of a face");
     folder.refused(
         &["three-finger", "cube", "--face", "1=6"],
         "contact.1.face: the object has no face 6; has to be between 0 and 5",

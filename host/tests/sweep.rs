@@ -366,7 +366,7 @@ fn what_cannot_be_swept_is_refused_with_what_to_do() {
     fs::write(folder.path().join("x.csv.journal"), "notes").unwrap();
     refused(
         &with(&[]),
-        "x.csv.journal: is no journal of a sweep; choose another --out, or overwrite it with --force",
+        "x.csv.journal: is not a journal of a sweep; choose another --out, or overwrite it with --force",
     );
     let output = sweep(folder.path(), &with(&["--force", "--duration", "0.1"]));
     assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));

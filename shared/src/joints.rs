@@ -105,7 +105,7 @@ fn apply(encoders: &[Encoder], angles_rad: &mut [f32], speeds_rad_s: &mut [f32])
 fn count(encoders: &[Encoder], angles_rad: &[f32], counts: &mut [i32]) {
     for ((count, angle_rad), encoder) in counts.iter_mut().zip(angles_rad).zip(encoders) {
         let exact = angle_rad / encoder.rad_per_count;
-        // The conversion rounds towards zero and saturates; it makes 0 of what is no number.
+        // The conversion rounds towards zero and saturates; it makes 0 of what is not a number.
         *count = (if exact < 0.0 { exact - 0.5 } else { exact + 0.5 }) as i32;
     }
 }

@@ -106,7 +106,7 @@ fn bad_input_is_told() {
         (vec!["info"], "--port"),
         (vec!["info", "--port", "/dev/no-such-port"], "cannot open /dev/no-such-port: No such file"),
         (vec!["info", "--port", "unix:/no/socket"], "cannot open unix:/no/socket: No such file"),
-        (vec!["info", "--port", "/dev/null"], "/dev/null is no serial port"),
+        (vec!["info", "--port", "/dev/null"], "/dev/null is not a serial port"),
         (
             vec!["get", "--port", "/dev/null", "force"],
             "there is no parameter force; there are damping_nm_s, ",

@@ -65,7 +65,7 @@ pub enum ConfigError {
         /// DACs, of four outputs each.
         dacs: usize,
     },
-    /// `nm_per_volt` is zero or no finite number, or so small that a volt is no number of codes.
+    /// `nm_per_volt` is zero or no finite number, or so small that a volt is not a number of codes.
     Scale {
         /// The joint.
         joint: usize,
@@ -391,7 +391,7 @@ fn switch_off<E: OutputPin, O: SpiDevice>(enable: &mut E, dacs: &mut [Dac<O>]) {
     }
 }
 
-/// The code nearest to a torque, at most full scale; that of 0 N m if it is no finite number.
+/// The code nearest to a torque, at most full scale; that of 0 N m if it is not a finite number.
 fn nearest_code(torque_nm: f32, codes_per_nm: f32) -> i16 {
     if !torque_nm.is_finite() {
         return 0;
@@ -401,7 +401,7 @@ fn nearest_code(torque_nm: f32, codes_per_nm: f32) -> i16 {
     (if code < 0.0 { code - 0.5 } else { code + 0.5 }) as i16
 }
 
-/// A count that no other joint has, and that is no pattern of a stuck line.
+/// A count that no other joint has, and that is not a pattern of a stuck line.
 fn tag(joint: usize) -> u32 {
     0x5A00_00A5 | ((joint as u32 & 0xFFFF) << 8)
 }

@@ -24,7 +24,7 @@ const MOST_RECEIVED: usize = Reply::<MAX_JOINTS>::MOST_BYTES + CRC_BYTES;
 const MOST_SENT: usize = most_bytes(Packet::MOST_BYTES);
 /// Time for which one knock waits.
 const KNOCK: Duration = Duration::from_millis(250);
-/// A request that there is none of.
+/// The number of a request that no hand knows.
 const NO_REQUEST: u8 = 0x7f;
 
 /// Times to wait.

@@ -489,7 +489,7 @@ impl Talk {
             }
             _ => None,
         };
-        // What is no number is no reason to change it.
+        // What is not a number is no reason to change it.
         if let Some(ms) = heartbeat_ms.filter(|ms| !ms.is_nan()) {
             self.heartbeat = Duration::from_secs_f32((ms / HEARTBEATS).clamp(1.0, HEARTBEAT_MOST_MS) / 1e3);
             self.due = self.due.min(now + self.heartbeat);
@@ -567,7 +567,7 @@ impl Talk {
 /// The reason for which a line could not be opened.
 #[derive(Debug, thiserror::Error)]
 pub enum LineError {
-    /// It is no serial port that can be used.
+    /// It is not a serial port that can be used.
     #[error(transparent)]
     Serial(#[from] OpenError),
     /// It can't have the rate that was asked for.

@@ -271,7 +271,7 @@ pub enum OpenError {
         known: Vec<PathBuf>,
     },
     /// It is something else.
-    #[error("cannot open the serial port {}: it is no serial port; {remedy}", .path.display())]
+    #[error("cannot open the serial port {}: it is not a serial port; {remedy}", .path.display())]
     NoSerialPort {
         /// What it is.
         path: PathBuf,

@@ -150,7 +150,7 @@ pub(super) fn control(control: &Control) -> Result<()> {
     if (microseconds - microseconds.round()).abs() > 1e-6 {
         return fail(
             "control.period_s",
-            format!("{:?} s is no whole number of microseconds", control.period_s),
+            format!("{:?} s is not a whole number of microseconds", control.period_s),
             format!("{:?} is", microseconds.round() * 1e-6),
         );
     }

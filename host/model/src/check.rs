@@ -65,7 +65,7 @@ pub(super) fn schema(key: &str, version: u32) -> Result<()> {
 pub(super) fn name(key: &str, word: &str) -> Result<()> {
     if word.is_empty() || word.len() > LONGEST_NAME || word.chars().any(char::is_control) {
         let remedy = format!("has to be a word of at most {LONGEST_NAME} bytes, without control characters");
-        return fail(key, "is no name", remedy);
+        return fail(key, "is not a name", remedy);
     }
     Ok(())
 }

@@ -167,13 +167,13 @@ impl Document {
             let remedy = format!("`blindgrasp hand new {name}` writes a hand's file that names it");
             return Err(SceneError::new(
                 "",
-                "a URDF alone is no hand: it has no fingertips and gains",
+                "a URDF alone is not a hand: it has no fingertips and gains",
                 remedy,
             ));
         }
         if kind == Kind::Object && mesh::is_mesh(name) {
             let remedy = format!("`blindgrasp object new {name}` writes an object's file that names it");
-            return Err(SceneError::new("", "a mesh alone is no object: it has no unit and no mass", remedy));
+            return Err(SceneError::new("", "a mesh alone is not an object: it has no unit and no mass", remedy));
         }
         if is_path(name) {
             let path = folder.join(name);

@@ -116,7 +116,7 @@ impl Link {
         if fs::symlink_metadata(path).is_ok_and(|found| !found.is_symlink()) {
             return Err(io::Error::new(
                 ErrorKind::AlreadyExists,
-                "there is a file, which is no symbolic link",
+                "there is a file, which is not a symbolic link",
             ));
         }
         // Renamed, so that there is always one or the other.

@@ -28,7 +28,7 @@ impl Twin {
     /// The first parameter that the controller refuses.
     pub fn new(hand: &HandModel, clock: Clock) -> Result<Self, ParameterError> {
         let params = Params::new(hand.hand.cast(), &hand.config)?;
-        // Its names are nobody's concern: who it is, the firmware says.
+        // Its names do not matter: the firmware tells its own.
         let image = Image {
             interface_version: INTERFACE_VERSION,
             kind: "pil",

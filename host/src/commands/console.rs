@@ -720,7 +720,7 @@ fn parameter(key: &str) -> anyhow::Result<Parameter> {
     Parameter::named(key).with_context(|| {
         let keys = Parameter::ALL.map(|parameter| parameter.to_string());
         let keys = keys.iter().map(String::as_str);
-        format!("`{key}` is no parameter: {}", similar(key, keys).unwrap_or("type `get` for all".to_owned()))
+        format!("`{key}` is not a parameter: {}", similar(key, keys).unwrap_or("type `get` for all".to_owned()))
     })
 }
 
@@ -750,7 +750,7 @@ fn misuse(word: &str) -> String {
         return format!("use: {}: {words}", usage(word, values));
     }
     let known = WORDS.iter().map(|&(known, ..)| known);
-    format!("`{word}` is no command: {}", similar(word, known).unwrap_or("type `help` for all".to_owned()))
+    format!("`{word}` is not a command: {}", similar(word, known).unwrap_or("type `help` for all".to_owned()))
 }
 
 fn similar<'a>(word: &str, known: impl Iterator<Item = &'a str>) -> Option<String> {

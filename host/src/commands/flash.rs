@@ -168,7 +168,7 @@ fn read(path: &Path) -> anyhow::Result<Vec<u8>> {
     let about = || format!("cannot read the image {}", path.display());
     let metadata = fs::metadata(path).with_context(about)?;
     if !metadata.is_file() || metadata.len() > LARGEST_FILE_BYTES {
-        bail!("{} is no image of a microcontroller; give the ELF file that cargo links", path.display());
+        bail!("{} is not an image of a microcontroller; give the ELF file that cargo links", path.display());
     }
     fs::read(path).with_context(about)
 }
@@ -269,7 +269,7 @@ fn describe_report(report: &Report<'_>) -> String {
     lines.into_iter().chain(brown_out).map(|(name, value)| format!("{name:<22}{value}\n")).collect()
 }
 
-/// One bar for one phase after the other; hidden where stderr is no terminal.
+/// One bar for one phase after the other; hidden where stderr is not a terminal.
 struct Bars(ProgressBar);
 
 impl Bars {

@@ -59,7 +59,7 @@ pub(super) fn damage_of(recording: &Recording, entries: &Entries) -> Option<Stri
     (!damage.is_none() || damage.unfinished).then(|| damage.to_string())
 }
 
-/// A bar over the bytes of a file; hidden where stderr is no terminal.
+/// A bar over the bytes of a file; hidden where stderr is not a terminal.
 pub(super) fn reading_bar(path: &Path) -> ProgressBar {
     let bytes = std::fs::metadata(path).map_or(0, |metadata| metadata.len());
     let style = "{bar:40} {percent:>3} %  {bytes} of {total_bytes}, {eta} left";

@@ -96,7 +96,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
     Ok(if run.summary.grasp_held { Outcome::Shown } else { Outcome::Failed })
 }
 
-/// A bar over simulated milliseconds; hidden where stderr is no terminal.
+/// A bar over simulated milliseconds; hidden where stderr is not a terminal.
 pub(super) fn progress_bar(duration_s: f64) -> ProgressBar {
     let style = "{bar:40} {percent:>3} %  {msg}simulated, {eta} left";
     ProgressBar::new((duration_s * 1e3) as u64)

@@ -165,7 +165,7 @@ fn warn(plan: &Plan) {
     }
 }
 
-/// A bar over the runs; hidden where stderr is no terminal.
+/// A bar over the runs; hidden where stderr is not a terminal.
 fn progress_bar(runs: usize, done: usize) -> ProgressBar {
     let style = "{bar:40} {pos} of {len} runs, {eta} left";
     let bar = ProgressBar::new(runs as u64)

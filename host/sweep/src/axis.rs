@@ -118,7 +118,7 @@ struct Range {
 }
 
 impl Range {
-    /// `None` if the text is no range: something else may have two points in it, such as a path.
+    /// `None` if the text is not a range: something else may have two points in it, such as a path.
     fn parse(text: &str) -> Option<Result<Self, String>> {
         let (from, rest) = text.split_once("..")?;
         let from = Value::written(from.trim()).number?;
@@ -128,9 +128,9 @@ impl Range {
     fn parse_rest(from: f64, rest: &str) -> Result<Self, String> {
         let mut parts = rest.split(':').map(str::trim);
         let to = parts.next().unwrap_or_default();
-        let to = Value::written(to).number.ok_or_else(|| format!("`{to}` is no number"))?;
+        let to = Value::written(to).number.ok_or_else(|| format!("`{to}` is not a number"))?;
         let count = parts.next().ok_or("the number of values is missing")?;
-        let count = count.parse().map_err(|_| format!("`{count}` is no number of values"))?;
+        let count = count.parse().map_err(|_| format!("`{count}` is not a number of values"))?;
         let scale = match parts.next() {
             None => Scale::Linear,
             Some("log") => Scale::Logarithmic,
@@ -267,9 +267,9 @@ mod tests {
             ("=1,2", "=1,2: is not a key with values"),
             ("k=", "k=: is not a key with values"),
             ("k=1..2", "k: the number of values is missing"),
-            ("k=1..two:3", "k: `two` is no number"),
-            ("k=1..2:three", "k: `three` is no number of values"),
-            ("k=1..2:-3", "k: `-3` is no number of values"),
+            ("k=1..two:3", "k: `two` is not a number"),
+            ("k=1..2:three", "k: `three` is not a number of values"),
+            ("k=1..2:-3", "k: `-3` is not a number of values"),
             ("k=1..2:1", "k: 1 values are no range: it has 2 to 1000000"),
             ("k=1..2:1000001", "k: 1000001 values are no range: it has 2 to 1000000"),
             ("k=1..2:3:ln", "k: `ln` is unknown"),

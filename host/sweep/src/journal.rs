@@ -57,7 +57,7 @@ pub enum JournalError {
         difference: String,
     },
     /// It is something else, or its beginning is damaged.
-    #[error("{}: is no journal of a sweep; choose another --out, or overwrite it with --force", path.display())]
+    #[error("{}: is not a journal of a sweep; choose another --out, or overwrite it with --force", path.display())]
     NoJournal {
         /// The file.
         path: PathBuf,

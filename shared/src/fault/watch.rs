@@ -284,7 +284,7 @@ impl<const J: usize> Watch<J> {
 
     /// The first joint whose torque is not a finite number.
     pub fn torques(&self, torques_nm: &[f32; J]) -> Option<Raised> {
-        // Zero times what is not finite is no number, and then the sum is none: one comparison for all.
+        // Zero times what is not finite is not a number, and then the sum is none: one comparison for all.
         if torques_nm.iter().fold(0.0, |sum, torque| sum + 0.0 * torque) == 0.0 {
             return None;
         }

@@ -56,7 +56,7 @@ pub enum PolyhedronError {
     /// Rounding decides which points are corners.
     #[error("some points lie so close to a plane or a line through others that the faces are not clear")]
     Unclear,
-    /// A mesh that is no body.
+    /// A mesh that is not a body.
     #[error(transparent)]
     Mesh(#[from] MeshFault),
 }

@@ -14,7 +14,7 @@ const HALT_TIMEOUT: Duration = Duration::from_millis(500);
 /// The reason for which there is no session.
 #[derive(Debug, thiserror::Error)]
 pub enum ProbeError {
-    /// The text that was asked for is no selector.
+    /// The text that was asked for is not a selector.
     #[error(
         "`{0}` does not select a probe; write VID:PID or VID:PID:SERIAL in hexadecimal, such as 0483:374b"
     )]

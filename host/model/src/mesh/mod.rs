@@ -81,7 +81,7 @@ pub(super) fn expand(object: &mut Node, home: &Home, notices: &mut Vec<Notice>) 
         Err(SceneError::new(key(name), problem, remedy).at(place))
     };
     let Value::String(file) = &entry.node.value else {
-        return fail("file", "is no name".into(), "write file = \"part.stl\"".into(), &place);
+        return fail("file", "is not a name".into(), "write file = \"part.stl\"".into(), &place);
     };
     for given in ["vertices_m", "triangles"] {
         if mesh.get_mut(given).is_some() {
@@ -94,7 +94,7 @@ pub(super) fn expand(object: &mut Node, home: &Home, notices: &mut Vec<Notice>) 
             let value = match entry.node.value {
                 Value::Float(value) => value,
                 Value::Integer(value) => value as f64,
-                _ => return fail("scale", "is no number".into(), "write scale = 1.0".into(), &entry.place),
+                _ => return fail("scale", "is not a number".into(), "write scale = 1.0".into(), &entry.place),
             };
             within(&key("scale"), value, SCALES[0], SCALES[1]).map_err(|error| error.at(&entry.place))?;
             value
@@ -113,7 +113,7 @@ pub(super) fn expand(object: &mut Node, home: &Home, notices: &mut Vec<Notice>) 
                 return fail("unit", format!("`{word}` is unknown"), remedy, place);
             }
         },
-        Some((_, place)) => return fail("unit", "is no name".into(), "write unit = \"mm\"".into(), place),
+        Some((_, place)) => return fail("unit", "is not a name".into(), "write unit = \"mm\"".into(), place),
         None => {
             let remedy = Unit::choices(&soup.size(), |word| format!("unit = \"{word}\""));
             return fail("unit", "is missing".into(), remedy, &place);

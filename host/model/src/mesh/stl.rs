@@ -80,7 +80,7 @@ fn ascii(text: &[u8]) -> Result<Soup, Problem> {
         {
             let word = super::excerpt(&word);
             return Err(Problem::new(
-                format!("line {line}: `{word}` is no finite number"),
+                format!("line {line}: `{word}` is not a finite number"),
                 "export it again",
             ));
         }

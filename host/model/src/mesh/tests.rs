@@ -206,15 +206,15 @@ fn what_an_object_says_of_its_mesh_is_checked() {
              x 762 mm",
         ),
         ("file = \"part.stl\"\nunit = \"inch\"", "6: shape.mesh.unit: `inch` is unknown; did you mean `in`?"),
-        ("file = \"part.stl\"\nunit = 1", "6: shape.mesh.unit: is no name; write unit = \"mm\""),
-        ("file = 3\nunit = \"mm\"", "5: shape.mesh.file: is no name; write file = \"part.stl\""),
+        ("file = \"part.stl\"\nunit = 1", "6: shape.mesh.unit: is not a name; write unit = \"mm\""),
+        ("file = 3\nunit = \"mm\"", "5: shape.mesh.file: is not a name; write file = \"part.stl\""),
         (
             "file = \"part.stl\"\nunit = \"mm\"\nscale = 0",
             "7: shape.mesh.scale: 0.0 is out of range; has to be between 1e-6 and 1000000.0",
         ),
         (
             "file = \"part.stl\"\nunit = \"mm\"\nscale = \"1\"",
-            "7: shape.mesh.scale: is no number; write scale = 1.0",
+            "7: shape.mesh.scale: is not a number; write scale = 1.0",
         ),
         (
             "file = \"part.stl\"\nunit = \"mm\"\ntriangles = []",

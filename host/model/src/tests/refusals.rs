@@ -134,7 +134,7 @@ fn errors_say_where_what_and_what_to_do() {
         (
             "name = \"cube\"",
             "name = \"a\\nb\"",
-            "s.toml:3: name: is no name; has to be a word of at most 100 bytes, without control characters",
+            "s.toml:3: name: is not a name; has to be a word of at most 100 bytes, without control characters",
         ),
     ];
     for (from, to, expected) in cases {

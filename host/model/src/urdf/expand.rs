@@ -116,7 +116,7 @@ impl Parts<'_> {
             None => self.in_tree_order(),
             Some(Entry { node: Node { value: Value::Array(items), .. }, .. }) => self.in_own_order(items)?,
             Some(entry) => {
-                let error = SceneError::new("joint", "is no list", "write each joint as a [[joint]]");
+                let error = SceneError::new("joint", "is not a list", "write each joint as a [[joint]]");
                 return Err(error.at(&entry.place));
             }
         };
@@ -155,7 +155,7 @@ impl Parts<'_> {
                 return Err(error.at(&node.place));
             };
             let Value::String(word) = &name.value else {
-                let error = SceneError::new(key, "is no string", "has to be the name of a joint of the URDF");
+                let error = SceneError::new(key, "is not a string", "has to be the name of a joint of the URDF");
                 return Err(error.at(&name.place));
             };
             let index = self.find(word, &key).map_err(|error| error.at(&name.place))?;

@@ -188,7 +188,7 @@ impl Reader<'_> {
         Ok(body.seen_from(&origin.transform))
     }
 
-    /// Shapes of a link; what can't be read of them is nobody's loss.
+    /// Returns the shapes of a link. They only help to guess fingertips, so that one which can't be read is left out.
     fn shapes(&self, link: Node<'_, '_>) -> Vec<Shape> {
         let shapes = children(link, "collision").chain(children(link, "visual"));
         let shapes = shapes.filter_map(|shape| {
@@ -236,7 +236,7 @@ impl Reader<'_> {
         }
         let quaternion = nalgebra::Quaternion::new(w, x, y, z);
         if !((quaternion.norm_squared() - 1.0).abs() <= 2.0 * AXIS_SLACK) {
-            let problem = format!("{of}: quat_xyzw of <origin> is no unit quaternion");
+            let problem = format!("{of}: quat_xyzw of <origin> is not a unit quaternion");
             return self.fail(element, problem, "divide it by its length");
         }
         let attitude = UnitQuaternion::new_normalize(quaternion).to_rotation_matrix().into_inner();

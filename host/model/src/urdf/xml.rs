@@ -138,11 +138,11 @@ impl<'a> Text<'a> {
                 }
                 Err(_) if word.contains(',') => {
                     return fail(
-                        format!("`{}` is no number", quote(word)),
+                        format!("`{}` is not a number", quote(word)),
                         "separate numbers by blanks, and write decimals with a point",
                     );
                 }
-                Err(_) => return fail(format!("`{}` is no number", quote(word)), "write it as 0.1 or 1e-1"),
+                Err(_) => return fail(format!("`{}` is not a number", quote(word)), "write it as 0.1 or 1e-1"),
             }
         }
         if count == N {

@@ -61,7 +61,7 @@ fn missed(samples: &[Sample]) -> Missed {
         so_far_j = so_far_j.max(exchanged(&sample.energies));
         let scale_j = if sample.t_s - start_s < BEGINNING_S { exchanged_j } else { so_far_j };
         of.most_j = of.most_j.max(missed_j);
-        // A miss of what is no number counts.
+        // A miss of what is not a number counts.
         of.share = largest([of.share, missed_j / scale_j].into_iter());
     }
     of

@@ -82,7 +82,7 @@ impl Recording {
     /// Opens a file and looks what it is.
     ///
     /// # Errors
-    /// It is no recording, or one of a newer format, or can't be read at all.
+    /// It is not a recording, or one of a newer format, or can't be read at all.
     pub fn open(path: &Path) -> Result<Self, RecordingError> {
         let unreadable = |source| RecordingError::Io { action: "read", path: path.into(), source };
         let mut file = File::open(path).map_err(unreadable)?;

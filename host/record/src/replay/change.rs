@@ -52,14 +52,14 @@ impl FromStr for Change {
             let keys = Parameter::ALL.map(|parameter| parameter.to_string());
             let bare = key.split('[').next().unwrap_or(key);
             let keys = keys.iter().map(String::as_str);
-            return fail(format!("`{key}` is no parameter"), suggestion(bare, keys));
+            return fail(format!("`{key}` is not a parameter"), suggestion(bare, keys));
         };
         let which = match rest.strip_prefix('.') {
             _ if rest.is_empty() => Which::All,
             Some(name) => Which::Name(name.to_owned()),
             None => match rest.strip_prefix('[').and_then(|rest| rest.strip_suffix(']')).map(str::parse) {
                 Some(Ok(index)) => Which::Index(index),
-                _ => return fail(format!("`{rest}` is no index"), "write [0] for the first".into()),
+                _ => return fail(format!("`{rest}` is not an index"), "write [0] for the first".into()),
             },
         };
         if which != Which::All && parameter.each() == Each::Hand {
@@ -69,7 +69,7 @@ impl FromStr for Change {
             "off" => None,
             _ => match value.parse::<f32>() {
                 Ok(value) if value.is_finite() => Some(value),
-                _ => return fail(format!("`{value}` is no finite number"), "give one, or off".into()),
+                _ => return fail(format!("`{value}` is not a finite number"), "give one, or off".into()),
             },
         };
         Ok(Self { parameter, which, value, text: text.to_owned() })
@@ -167,14 +167,14 @@ mod tests {
     fn what_is_wrong_is_told_with_a_remedy() {
         for (text, told) in [
             ("damping_nm_s", "no value; write KEY=VALUE"),
-            ("dampng_nm_s=1", "`dampng_nm_s` is no parameter; did you mean `damping_nm_s`?"),
+            ("dampng_nm_s=1", "`dampng_nm_s` is not a parameter; did you mean `damping_nm_s`?"),
             ("dampng_nm_s[3]=1", "did you mean `damping_nm_s`?"),
             ("force_n[0]=1", "there is one `force_n`; leave out `[0]`"),
             ("force_n=off", "it can't be switched off"),
-            ("force_n=much", "`much` is no finite number"),
-            ("force_n=NaN", "`NaN` is no finite number"),
+            ("force_n=much", "`much` is not a finite number"),
+            ("force_n=NaN", "`NaN` is not a finite number"),
             ("damping_nm_s[12]=1", "there is no [12]; it goes from 0 to 11"),
-            ("damping_nm_s[a]=1", "`[a]` is no index"),
+            ("damping_nm_s[a]=1", "`[a]` is not an index"),
             ("damping_nm_s.finger-1-abdct=1", "did you mean `finger-1-abduct`?"),
             ("faults.heartbeat_ms=1.5", "out of its range"),
         ] {

@@ -40,7 +40,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
                 eprintln!("blindgrasp: wrote {}", path.display());
             }
             None => {
-                eprintln!("blindgrasp: no picture: it is not known what sits on what; mend the errors first")
+                eprintln!("blindgrasp: no picture: the tree of joints is not known; correct the errors first")
             }
         }
     }

@@ -51,7 +51,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
                 std::fs::write(path, svg).with_context(|| format!("cannot write {}", path.display()))?;
                 eprintln!("blindgrasp: wrote {}", path.display());
             }
-            None => eprintln!("blindgrasp: no picture: it is no body; mend the errors first"),
+            None => eprintln!("blindgrasp: no picture: it is not a body; correct the errors first"),
         }
     }
     Ok(if check.verdict == Verdict::Broken { Outcome::Failed } else { Outcome::Shown })

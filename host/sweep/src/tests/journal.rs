@@ -181,7 +181,7 @@ fn the_journal_of_another_sweep_is_refused_with_what_differs() {
     let path = no_journal.display();
     assert_eq!(
         error,
-        format!("{path}: is no journal of a sweep; choose another --out, or overwrite it with --force")
+        format!("{path}: is not a journal of a sweep; choose another --out, or overwrite it with --force")
     );
 }
 

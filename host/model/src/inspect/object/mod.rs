@@ -37,7 +37,7 @@ pub struct ObjectCheck {
     pub verdict: Verdict,
     /// The number of findings of each severity.
     pub counts: Counts,
-    /// The facts of the body; `None` where it is no body.
+    /// The facts of the body; `None` where it is not a body.
     pub body: Option<BodyFacts>,
     /// Its faces, in their order.
     pub faces: Vec<FaceFacts>,

@@ -134,7 +134,7 @@ fn the_largest_files_are_read_in_time() {
     }
     comb += &("f".to_owned() + &(1..=1000).map(|k| format!(" {k}")).collect::<String>() + "\n").repeat(200);
     let start = Instant::now();
-    let outcome = read("c.obj", comb.as_bytes()).expect_err("it is no body").what;
+    let outcome = read("c.obj", comb.as_bytes()).expect_err("it is not a body").what;
     println!("comb: {:.2} s: {outcome}", start.elapsed().as_secs_f64());
     assert!(start.elapsed().as_secs_f64() < SLOWEST_S);
 }

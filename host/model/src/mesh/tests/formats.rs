@@ -159,7 +159,7 @@ fn stl_files_that_lie_are_refused() {
     );
     assert_eq!(
         refusal(text.replacen("vertex 60 0 0", "vertex 60 0 nan", 1).as_bytes()),
-        "line 6: `nan` is no finite number; export it again"
+        "line 6: `nan` is not a finite number; export it again"
     );
     assert_eq!(
         refusal(text.replacen("vertex 0 0 30", "vertex 0 0", 1).as_bytes()),

@@ -127,7 +127,7 @@ fn errors_in_the_hand_s_file_name_it() {
         (
             "[control]",
             "[[joint]]\nname = 3\n[control]",
-            "hand.toml:8: joint.1.name: is no string; has to be the name of a joint of the URDF",
+            "hand.toml:8: joint.1.name: is not a string; has to be the name of a joint of the URDF",
         ),
         (
             "[control]",
@@ -167,7 +167,7 @@ fn errors_in_the_hand_s_file_name_it() {
         (
             "schema = 1",
             "schema = 1\njoint = 3",
-            "hand.toml:2: joint: is no list; write each joint as a [[joint]]",
+            "hand.toml:2: joint: is not a list; write each joint as a [[joint]]",
         ),
         (
             "[joint_defaults]",
@@ -192,7 +192,7 @@ fn errors_in_the_hand_s_file_name_it() {
 fn a_urdf_alone_is_no_hand() {
     for name in ["gripper.urdf", "some/gripper.urdf"] {
         let expected = format!(
-            "{name}: a URDF alone is no hand: it has no fingertips and gains; `blindgrasp hand new {name}` writes a hand's file that names it"
+            "{name}: a URDF alone is not a hand: it has no fingertips and gains; `blindgrasp hand new {name}` writes a hand's file that names it"
         );
         assert_eq!(HandFile::load(name).unwrap_err().to_string(), expected);
     }

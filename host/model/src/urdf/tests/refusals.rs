@@ -62,12 +62,12 @@ fn errors_in_the_urdf_say_where_what_and_what_to_do() {
         (
             "0 0.04 0",
             "0 oops 0",
-            "gripper.urdf:28: joint `left-base`: xyz of <origin>: `oops` is no number; write it as 0.1 or 1e-1",
+            "gripper.urdf:28: joint `left-base`: xyz of <origin>: `oops` is not a number; write it as 0.1 or 1e-1",
         ),
         (
             "0 0.04 0",
             "0,0.04,0",
-            "gripper.urdf:28: joint `left-base`: xyz of <origin>: `0,0.04,0` is no number; separate numbers by blanks, and write decimals with a point",
+            "gripper.urdf:28: joint `left-base`: xyz of <origin>: `0,0.04,0` is not a number; separate numbers by blanks, and write decimals with a point",
         ),
         (
             "0 0.04 0",
@@ -321,12 +321,12 @@ fn errors_in_the_urdf_say_where_what_and_what_to_do() {
         (
             "<joint name=\"left-base\"",
             "<joint name=\"left&#10;base\"",
-            "gripper.urdf:25: joint.1.name: is no name; has to be a word of at most 100 bytes, without control characters",
+            "gripper.urdf:25: joint.1.name: is not a name; has to be a word of at most 100 bytes, without control characters",
         ),
         (
             "<joint name=\"left-base\"",
             "<joint name=\"left-base-0123456789012345678901234567890123456789012345678901234567890123456789012345678901234567890123456789\"",
-            "gripper.urdf:25: joint.1.name: is no name; has to be a word of at most 100 bytes, without control characters",
+            "gripper.urdf:25: joint.1.name: is not a name; has to be a word of at most 100 bytes, without control characters",
         ),
         (
             "<joint name=\"left-base\"",
