@@ -173,7 +173,11 @@ impl Document {
         }
         if kind == Kind::Object && mesh::is_mesh(name) {
             let remedy = format!("`blindgrasp object new {name}` writes an object's file that names it");
-            return Err(SceneError::new("", "a mesh alone is not an object: it has no unit and no mass", remedy));
+            return Err(SceneError::new(
+                "",
+                "a mesh alone is not an object: it has no unit and no mass",
+                remedy,
+            ));
         }
         if is_path(name) {
             let path = folder.join(name);

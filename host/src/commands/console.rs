@@ -720,7 +720,10 @@ fn parameter(key: &str) -> anyhow::Result<Parameter> {
     Parameter::named(key).with_context(|| {
         let keys = Parameter::ALL.map(|parameter| parameter.to_string());
         let keys = keys.iter().map(String::as_str);
-        format!("`{key}` is not a parameter: {}", similar(key, keys).unwrap_or("type `get` for all".to_owned()))
+        format!(
+            "`{key}` is not a parameter: {}",
+            similar(key, keys).unwrap_or("type `get` for all".to_owned())
+        )
     })
 }
 

@@ -94,7 +94,9 @@ pub(super) fn expand(object: &mut Node, home: &Home, notices: &mut Vec<Notice>) 
             let value = match entry.node.value {
                 Value::Float(value) => value,
                 Value::Integer(value) => value as f64,
-                _ => return fail("scale", "is not a number".into(), "write scale = 1.0".into(), &entry.place),
+                _ => {
+                    return fail("scale", "is not a number".into(), "write scale = 1.0".into(), &entry.place);
+                }
             };
             within(&key("scale"), value, SCALES[0], SCALES[1]).map_err(|error| error.at(&entry.place))?;
             value

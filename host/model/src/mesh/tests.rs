@@ -106,7 +106,7 @@ fn l_bracket() -> Mesh {
 /// `BLESS=1 cargo test -p blindgrasp --lib shipped_meshes` writes them.
 #[test]
 fn shipped_meshes_are_made_here() {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../models/objects");
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../models/objects");
     let head = b"# A regular octahedron with edges of 50, corners on the axes.\n";
     let octahedron = [head.to_vec(), wavefront_exact(&octahedron())].concat();
     for (name, bytes) in [("l-bracket.stl", binary(&l_bracket())), ("octahedron.obj", octahedron)] {
@@ -154,7 +154,7 @@ fn a_scene_with_a_mesh_needs_no_file() {
     )
     .unwrap();
     let cube =
-        std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("../models/scenes/cube.toml"))
+        std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("../../models/scenes/cube.toml"))
             .unwrap();
     let by_reference = cube.replace("object = \"cube\"", "object = \"parts/block.toml\"");
     let path = folder.join("scene.toml");
@@ -252,9 +252,10 @@ fn what_an_object_says_of_its_mesh_is_checked() {
 #[test]
 fn numbers_of_a_mesh_are_checked() {
     let scene = |mesh: &str| {
-        let cube =
-            std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("../models/scenes/cube.toml"))
-                .unwrap();
+        let cube = std::fs::read_to_string(
+            Path::new(env!("CARGO_MANIFEST_DIR")).join("../../models/scenes/cube.toml"),
+        )
+        .unwrap();
         let object = "[object]\nschema = 1\nname = \"b\"\nmass_kg = 0.002\n[object.shape.mesh]\n";
         let text = cube.replace("object = \"cube\"", "") + object + mesh;
         Scene::parse(&text, "s.toml", Path::new(""), &[]).expect_err("has to be refused").to_string()

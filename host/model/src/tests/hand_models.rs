@@ -170,7 +170,7 @@ fn a_hand_can_have_the_earlier_law() {
 #[test]
 fn the_same_hand_gives_the_same_bytes_wherever_it_lies() {
     let manifest = Path::new(env!("CARGO_MANIFEST_DIR"));
-    let path = manifest.join("../models/hands/three-finger.toml");
+    let path = manifest.join("../../models/hands/three-finger.toml");
     let from_disk = HandModel::load(path.to_str().unwrap()).unwrap();
     let built_in = HandModel::load("three-finger").unwrap();
     assert_eq!(from_disk, built_in);

@@ -155,7 +155,8 @@ impl Parts<'_> {
                 return Err(error.at(&node.place));
             };
             let Value::String(word) = &name.value else {
-                let error = SceneError::new(key, "is not a string", "has to be the name of a joint of the URDF");
+                let error =
+                    SceneError::new(key, "is not a string", "has to be the name of a joint of the URDF");
                 return Err(error.at(&name.place));
             };
             let index = self.find(word, &key).map_err(|error| error.at(&name.place))?;

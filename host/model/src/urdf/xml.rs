@@ -142,7 +142,9 @@ impl<'a> Text<'a> {
                         "separate numbers by blanks, and write decimals with a point",
                     );
                 }
-                Err(_) => return fail(format!("`{}` is not a number", quote(word)), "write it as 0.1 or 1e-1"),
+                Err(_) => {
+                    return fail(format!("`{}` is not a number", quote(word)), "write it as 0.1 or 1e-1");
+                }
             }
         }
         if count == N {

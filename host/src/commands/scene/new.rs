@@ -138,8 +138,10 @@ fn scene_like(arguments: &Arguments) -> anyhow::Result<SceneFile> {
     like.contacts = vec![ContactFile::default(); like.hand.fingertips.len()];
     for text in &arguments.faces {
         let (fingertip, face) = wish("--face", text, &like)?;
-        let face =
-            face.parse().ok().with_context(|| format!("--face {text}: `{face}` is not a number of a face"))?;
+        let face = face
+            .parse()
+            .ok()
+            .with_context(|| format!("--face {text}: `{face}` is not a number of a face"))?;
         like.contacts[fingertip].face = Some(face);
     }
     for text in &arguments.points {
@@ -179,7 +181,10 @@ fn trunk(settings: &[String]) -> anyhow::Result<BTreeMap<String, f64>> {
             let (joint, angle) =
                 text.split_once('=').with_context(|| format!("--trunk {text}: has to be JOINT=RAD"))?;
             let angle = angle.parse().ok().filter(|angle: &f64| angle.is_finite());
-            Ok((joint.to_owned(), angle.with_context(|| format!("--trunk {text}: the angle is not a number"))?))
+            Ok((
+                joint.to_owned(),
+                angle.with_context(|| format!("--trunk {text}: the angle is not a number"))?,
+            ))
         })
         .collect()
 }

@@ -61,7 +61,7 @@ fn hands_of_any_size_can_be_drawn() {
     }
     assert_sound(&hand_svg("x", &hand, &[], &[f64::NAN; MAX_JOINTS]));
     // Bones of 64 m.
-    let path = format!("{}/../models/hands/three-finger.toml", env!("CARGO_MANIFEST_DIR"));
+    let path = format!("{}/../../models/hands/three-finger.toml", env!("CARGO_MANIFEST_DIR"));
     let text = std::fs::read_to_string(path).unwrap().replace("0.064]", "64.0]");
     let check = HandCheck::parse(&text, "hand.toml").unwrap();
     let nominal = check.nominal.unwrap();

@@ -153,7 +153,10 @@ fn totals(check: &HandCheck, text: &mut String) {
         );
     }
     if check.masses.is_none() {
-        line("unknown", "reach, masses, forces and where the fingertips meet: correct the errors first".into());
+        line(
+            "unknown",
+            "reach, masses, forces and where the fingertips meet: correct the errors first".into(),
+        );
     }
     if let Some(meeting) = &check.meeting {
         let everyone = check.fingertips.len();

@@ -13,7 +13,7 @@ const PAPER_S: [&str; 2] = ["three-finger", "two-finger"];
 
 /// The text of a shipped hand.
 fn text(name: &str) -> String {
-    let path = format!("{}/../models/hands/{name}.toml", env!("CARGO_MANIFEST_DIR"));
+    let path = format!("{}/../../models/hands/{name}.toml", env!("CARGO_MANIFEST_DIR"));
     std::fs::read_to_string(path).unwrap()
 }
 
