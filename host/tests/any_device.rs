@@ -69,7 +69,7 @@ fn frame(message: &impl Serialize) -> Vec<u8> {
 /// The device.
 struct Liar {
     random: Rng,
-    /// How often it does something else than it should.
+    /// The share of times that it does something else than it should.
     lies: f64,
     kind: &'static str,
     receiver: Receiver<{ Packet::MOST_BYTES + 4 }>,
@@ -107,7 +107,7 @@ impl Liar {
         if self.lies() { TEXTS[self.random.usize(0..TEXTS.len())] } else { right }
     }
 
-    /// What a number is, or another.
+    /// Returns the right value, or another.
     fn or<T>(&mut self, right: T, others: &[T]) -> T
     where
         T: Copy,

@@ -47,7 +47,7 @@ impl Process {
         kill(Pid::from_raw(self.0.id() as i32), signal).expect("a signal");
     }
 
-    /// What it prints until it has printed this.
+    /// Returns the output until it has printed this.
     fn said_until(&mut self, wanted: &str) -> String {
         let stdout = self.0.stdout.as_mut().expect("stdout");
         let (mut said, mut byte) = (Vec::new(), [0]);
@@ -266,7 +266,7 @@ fn read(path: &Path) -> Vec<Content> {
     contents
 }
 
-/// What a file that is being written holds of its first device, if there is one yet.
+/// Returns the content of a file that is being written on its first device, if there is one yet.
 fn so_far(path: &Path) -> Option<Content> {
     Recording::open(path).ok()?;
     read(path).into_iter().next()

@@ -585,13 +585,13 @@ pub enum LineError {
     Socket {
         /// Its path.
         path: PathBuf,
-        /// Why not.
+        /// The cause.
         reason: io::Error,
     },
 }
 
 impl LineError {
-    /// Whether there is nothing of that name, as when an adapter is unplugged.
+    /// Returns `true` if there is nothing of that name, as when an adapter is unplugged.
     pub fn is_absence(&self) -> bool {
         match self {
             Self::Serial(error) => matches!(error, OpenError::NoSuchPort { .. }),

@@ -134,7 +134,7 @@ impl<R: io::Read + std::os::fd::AsFd, W: io::Write + std::os::fd::AsFd> Transpor
     }
 }
 
-/// Whether the other end is gone: a socket's, a pseudo-terminal's, or an adapter that was unplugged.
+/// Returns `true` if the other end is gone: a socket's, a pseudo-terminal's, or an adapter that was unplugged.
 fn has_hung_up(error: &io::Error) -> bool {
     use io::ErrorKind::{BrokenPipe, ConnectionReset, UnexpectedEof};
     #[cfg(unix)]
@@ -251,7 +251,7 @@ impl Lock {
 /// A program of which nothing else is known, and what to do.
 const ANOTHER: &str = "another program; stop that first";
 
-/// Why a serial port could not be opened, and what to do.
+/// The reason for which a serial port could not be opened, with the remedy.
 #[derive(Debug, thiserror::Error)]
 pub enum OpenError {
     /// Another program has it.
@@ -259,7 +259,7 @@ pub enum OpenError {
     InUse {
         /// The port.
         path: PathBuf,
-        /// Which program, and what to do.
+        /// The program, and the remedy.
         by: String,
     },
     /// There is none of that name, or not any more.
@@ -273,9 +273,9 @@ pub enum OpenError {
     /// It is something else.
     #[error("cannot open the serial port {}: it is not a serial port; {remedy}", .path.display())]
     NoSerialPort {
-        /// What it is.
+        /// The path.
         path: PathBuf,
-        /// What to do.
+        /// The remedy.
         remedy: String,
     },
     /// The user has no right to it.
@@ -283,7 +283,7 @@ pub enum OpenError {
     NotAllowed {
         /// The port.
         path: PathBuf,
-        /// What to do.
+        /// The remedy.
         remedy: String,
     },
     /// The adapter can't do the rate.
@@ -301,7 +301,7 @@ pub enum OpenError {
     Other {
         /// The port.
         path: PathBuf,
-        /// What the operating system says.
+        /// The error of the operating system.
         reason: io::Error,
         /// The ports that there are.
         known: Vec<PathBuf>,
@@ -309,7 +309,7 @@ pub enum OpenError {
 }
 
 impl OpenError {
-    /// What the operating system says of a port, in terms of what to do.
+    /// Returns the error of a port that tells what to do about the operating system's.
     fn of(path: &Path, reason: io::Error) -> Self {
         use io::ErrorKind::{NotFound, PermissionDenied, ResourceBusy};
         let path = path.to_owned();
@@ -333,7 +333,7 @@ impl OpenError {
     }
 }
 
-/// Whether the operating system says that it is something else than a terminal.
+/// Returns `true` if the operating system says that it is something else than a terminal.
 #[cfg(unix)]
 fn is_no_terminal(error: &io::Error) -> bool {
     error.raw_os_error() == Some(nix::errno::Errno::ENOTTY as i32)
@@ -344,7 +344,7 @@ fn is_no_terminal(_error: &io::Error) -> bool {
     false
 }
 
-/// How to get the right to a port, in words.
+/// Returns the way to get the right to a port, in words.
 #[cfg(unix)]
 fn right_to(path: &Path) -> String {
     use std::os::unix::fs::MetadataExt as _;

@@ -20,7 +20,7 @@ pub struct Pty {
     port: PathBuf,
     /// `true` if a program has opened the port, as far as is known.
     attended: bool,
-    /// What the program has not taken yet.
+    /// The bytes that the program has not taken yet.
     waiting: Vec<u8>,
     lost_bytes: u64,
 }

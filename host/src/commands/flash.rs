@@ -69,7 +69,7 @@ pub(crate) struct Arguments {
 /// Larger files are no images of a microcontroller, bytes.
 const LARGEST_FILE_BYTES: u64 = 256 << 20;
 
-/// What is printed.
+/// The report that is printed.
 #[derive(Serialize)]
 struct Report<'a> {
     image: String,
@@ -77,7 +77,7 @@ struct Report<'a> {
     kind: &'a str,
     hand: &'a str,
     hand_hash: String,
-    /// Whether `--hand` gave a hand that the image was compared with.
+    /// `true` if `--hand` gave a hand that the image was compared with.
     hand_checked: bool,
     interface_version: u16,
     firmware_version: &'a str,
@@ -173,7 +173,7 @@ fn read(path: &Path) -> anyhow::Result<Vec<u8>> {
     fs::read(path).with_context(about)
 }
 
-/// What the firmware must have for its logs to be followed.
+/// Returns the follower of the firmware's logs, if it has what that needs.
 fn follower(firmware: &Firmware<'_>, file: &[u8]) -> anyhow::Result<(u64, Logs)> {
     let logs = Logs::parse(file)?;
     let control_block = firmware.rtt_control_block.context(

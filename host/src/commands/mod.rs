@@ -1,4 +1,4 @@
-//! What the command line can do, a file a command.
+//! The command line, a file a command.
 
 pub(crate) mod console;
 pub(crate) mod export;
@@ -27,7 +27,7 @@ pub(crate) mod sweep;
 #[allow(unused_imports)]
 pub(crate) use not_built::*;
 
-/// How a command ended that was not misused.
+/// The end of a command that was not misused.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Outcome {
     /// It showed what it should: exit code 0.
