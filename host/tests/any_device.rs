@@ -6,9 +6,6 @@ use blindgrasp::body::MAX_JOINTS;
 use blindgrasp::device::recorder::Recording;
 use blindgrasp::device::talk::{PATIENCE, Talk};
 use blindgrasp::model::HandModel;
-use blindgrasp::monitor::live::{Live, Told};
-use blindgrasp::monitor::model::{Model, Plot};
-use blindgrasp::monitor::view::{self, Palette, Screen, Source};
 use blindgrasp::record::mcap;
 use blindgrasp::wire::{Packet, Record, Request, printable};
 use blindgrasp_shared::command::{Command, Grasp, Refusal};
@@ -18,8 +15,6 @@ use blindgrasp_shared::link::{Receiver, encode};
 use blindgrasp_shared::parameters::{Parameter, Setting};
 use blindgrasp_shared::telemetry::{INTERFACE_VERSION, List};
 use fastrand::Rng;
-use ratatui::Terminal;
-use ratatui::backend::TestBackend;
 use serde::ser::SerializeTuple as _;
 use serde::{Serialize, Serializer};
 use std::io::{ErrorKind, Read as _, Write as _};
@@ -316,58 +311,68 @@ fn port(folder: &Path, seed: u64, kind: &'static str, time: Duration) -> String 
     format!("unix:{}", path.display())
 }
 
-#[test]
-fn the_monitor_shows_whatever_a_device_says() {
-    let folder = TempDir::new().expect("a folder");
-    let folder = folder.path();
-    let drawn: Vec<bool> = thread::scope(|scope| {
-        let monitors: Vec<_> = (1000..1016)
-            .map(|seed| {
-                scope.spawn(move || watched(&port(folder, seed, "hand", Duration::from_secs(1)), seed))
-            })
-            .collect();
-        monitors.into_iter().map(|monitor| monitor.join().expect("no panic")).collect()
-    });
-    assert!(drawn.iter().filter(|has_record| **has_record).count() > drawn.len() / 2, "{drawn:?}");
-}
+#[cfg(feature = "monitor")]
+mod monitor {
+    use super::*;
+    use blindgrasp::monitor::live::{Live, Told};
+    use blindgrasp::monitor::model::{Model, Plot};
+    use blindgrasp::monitor::view::{self, Palette, Screen, Source};
+    use ratatui::Terminal;
+    use ratatui::backend::TestBackend;
 
-/// Watches for a while; returns whether there was a record to be shown.
-fn watched(port: &str, seed: u64) -> bool {
-    let mut random = Rng::with_seed(!seed);
-    let live = Live::open(port, None, None, None).expect("a line");
-    let mut model = Model::new();
-    let mut was_shown = false;
-    let begun = Instant::now();
-    while begun.elapsed() < Duration::from_secs(2) {
-        for told in live.fetch().expect("its thread goes on") {
-            if let Told::News(at, news) = told {
-                model.take(at, news);
-            }
-        }
-        was_shown |= model.record().is_some();
-        let joints = model.joint_count();
-        let screen = Screen {
-            source: Source::Port { port, saved: None },
-            plot: Plot::all()[random.usize(0..Plot::all().len())],
-            window_s: [5, 20, 60][random.usize(0..3)],
-            joint: (joints > 0 && random.bool()).then(|| random.usize(0..joints)),
-            help: random.u8(0..10) == 0,
-            question: None,
-            palette: Palette { coloured: random.bool() },
-        };
-        let size = TestBackend::new(random.u16(1..160), random.u16(1..60));
-        let mut terminal = Terminal::new(size).expect("a terminal");
-        terminal.draw(|frame| view::draw(frame, &model, &screen, live.now())).expect("it can be drawn");
-        let cells = terminal.backend().buffer().content.iter();
-        let symbols: String = cells.map(|cell| cell.symbol()).collect();
-        assert_eq!(printable(&symbols), symbols);
-        if random.u8(0..10) == 0 {
-            live.ask(Command::Arm);
-        }
-        thread::sleep(Duration::from_millis(5));
+    #[test]
+    fn the_monitor_shows_whatever_a_device_says() {
+        let folder = TempDir::new().expect("a folder");
+        let folder = folder.path();
+        let drawn: Vec<bool> = thread::scope(|scope| {
+            let monitors: Vec<_> = (1000..1016)
+                .map(|seed| {
+                    scope.spawn(move || watched(&port(folder, seed, "hand", Duration::from_secs(1)), seed))
+                })
+                .collect();
+            monitors.into_iter().map(|monitor| monitor.join().expect("no panic")).collect()
+        });
+        assert!(drawn.iter().filter(|has_record| **has_record).count() > drawn.len() / 2, "{drawn:?}");
     }
-    live.close();
-    was_shown
+
+    /// Watches for a while; returns whether there was a record to be shown.
+    fn watched(port: &str, seed: u64) -> bool {
+        let mut random = Rng::with_seed(!seed);
+        let live = Live::open(port, None, None, None).expect("a line");
+        let mut model = Model::new();
+        let mut was_shown = false;
+        let begun = Instant::now();
+        while begun.elapsed() < Duration::from_secs(2) {
+            for told in live.fetch().expect("its thread goes on") {
+                if let Told::News(at, news) = told {
+                    model.take(at, news);
+                }
+            }
+            was_shown |= model.record().is_some();
+            let joints = model.joint_count();
+            let screen = Screen {
+                source: Source::Port { port, saved: None },
+                plot: Plot::all()[random.usize(0..Plot::all().len())],
+                window_s: [5, 20, 60][random.usize(0..3)],
+                joint: (joints > 0 && random.bool()).then(|| random.usize(0..joints)),
+                help: random.u8(0..10) == 0,
+                question: None,
+                palette: Palette { coloured: random.bool() },
+            };
+            let size = TestBackend::new(random.u16(1..160), random.u16(1..60));
+            let mut terminal = Terminal::new(size).expect("a terminal");
+            terminal.draw(|frame| view::draw(frame, &model, &screen, live.now())).expect("it can be drawn");
+            let cells = terminal.backend().buffer().content.iter();
+            let symbols: String = cells.map(|cell| cell.symbol()).collect();
+            assert_eq!(printable(&symbols), symbols);
+            if random.u8(0..10) == 0 {
+                live.ask(Command::Arm);
+            }
+            thread::sleep(Duration::from_millis(5));
+        }
+        live.close();
+        was_shown
+    }
 }
 
 /// Runs the command at a device that hangs up after a while; asserts that it ends in order, and prints nothing that does something

@@ -36,6 +36,8 @@ struct Board {
     reading: Reading<MAX_JOINTS>,
     mode: Mode,
     fault: Option<Raised>,
+    /// Mode of the last record that was sent.
+    told: Option<Mode>,
     heartbeats: usize,
     hand_hash: u32,
     store: Option<Store<Memory>>,
@@ -94,6 +96,7 @@ impl Board {
             reading: Reading::Counts(counts),
             mode: Mode::Disarmed,
             fault: None,
+            told: None,
             heartbeats: 0,
             hand_hash: hand.hash(),
             store,
@@ -125,6 +128,7 @@ impl Board {
             said.extend(frame(&reply));
         }
         if let Some(form) = outputs.telemetry {
+            self.told = Some(self.mode);
             said.extend(frame(&form.of(&outputs.record)));
         }
         said
@@ -881,7 +885,7 @@ mod command {
     fn a_script_does_not_go_on_after_a_reset() {
         let (mut child, _folder) = start(|socket| {
             let same = socket.try_clone().expect("a socket");
-            drop(serve_until(Board::new(), socket, |board| board.mode == Mode::Armed));
+            drop(serve_until(Board::new(), socket, |board| board.told == Some(Mode::Armed)));
             drop(serve(Board::new(), same));
         });
         let mut stdin = child.stdin.take().expect("stdin");
@@ -895,7 +899,7 @@ mod command {
     #[test]
     fn a_line_that_is_lost_ends_the_command() {
         let (mut child, _folder) =
-            start(|socket| drop(serve_until(Board::new(), socket, |board| board.heartbeats > 3)));
+            start(|socket| drop(serve_until(Board::new(), socket, |board| board.told.is_some())));
         let _kept_open = child.stdin.take();
         let (output, said, errors) = ended(child);
         assert_eq!(output.status.code(), Some(2));

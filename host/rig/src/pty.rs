@@ -3,11 +3,11 @@
 use nix::errno::Errno;
 use nix::fcntl::{FcntlArg, OFlag, fcntl};
 use nix::pty::openpty;
-use nix::sys::termios::{SetArg, cfmakeraw, tcgetattr, tcsetattr};
+use nix::sys::termios::{FlushArg, SetArg, cfmakeraw, tcflush, tcgetattr, tcsetattr};
 use nix::unistd::ttyname;
-use std::fs::{self, File};
+use std::fs::{self, File, OpenOptions};
 use std::io::{self, ErrorKind, Read as _, Write as _};
-use std::os::unix::fs::symlink;
+use std::os::unix::fs::{OpenOptionsExt as _, symlink};
 use std::path::{Path, PathBuf};
 
 /// Most bytes that wait for a program that does not read for a while, besides the 12 KiB of a pseudo-terminal: what the kernel keeps of
@@ -52,11 +52,24 @@ impl Pty {
     /// If the operating system refuses.
     pub fn receive(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
         let received = self.end.read(buffer);
-        self.attended = !received.as_ref().is_err_and(is_nobody);
+        let is_attended = !received.as_ref().is_err_and(is_nobody);
+        if std::mem::replace(&mut self.attended, is_attended) && !is_attended {
+            self.forget()?;
+        }
         match received {
             Err(error) if is_nobody(&error) || is_nothing(&error) => Ok(0),
             other => other,
         }
+    }
+
+    /// Throws away what the last program has not read: it must not wait for the next.
+    fn forget(&mut self) -> io::Result<()> {
+        self.waiting.clear();
+        // From this end only a part can be reached.
+        let flags = (OFlag::O_NOCTTY | OFlag::O_NONBLOCK).bits();
+        let port = OpenOptions::new().read(true).custom_flags(flags).open(&self.port)?;
+        tcflush(&port, FlushArg::TCIFLUSH)?;
+        Ok(())
     }
 
     /// Sends bytes, and those that wait, if anybody was there when it was last looked whether something came. Nobody waits for a
@@ -66,8 +79,6 @@ impl Pty {
     /// If the operating system refuses.
     pub fn send(&mut self, bytes: &[u8]) -> io::Result<()> {
         if !self.attended {
-            // They must not wait for the next program.
-            self.waiting.clear();
             return Ok(());
         }
         let taken = bytes.len().min(MOST_WAITING - self.waiting.len());
@@ -142,7 +153,6 @@ impl Drop for Link {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use std::fs::OpenOptions;
 
     #[test]
     fn a_program_that_reads_late_gets_what_there_is_room_for_and_the_next_one_nothing() {
