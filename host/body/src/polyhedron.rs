@@ -14,6 +14,7 @@ mod face;
 mod hull;
 mod mass;
 mod mesh;
+mod obj;
 mod outlines;
 mod pole;
 mod regions;

@@ -158,7 +158,7 @@ fn write_value(buffer: &mut Vec<u8>, number: u32, value: Value<'_>, joint_names:
     }
 }
 
-fn text(buffer: &mut Vec<u8>, number: u32, text: &str) {
+pub(super) fn text(buffer: &mut Vec<u8>, number: u32, text: &str) {
     key(buffer, number, LENGTH);
     varint(buffer, text.len() as u64);
     buffer.extend_from_slice(text.as_bytes());
@@ -166,7 +166,7 @@ fn text(buffer: &mut Vec<u8>, number: u32, text: &str) {
 
 /// A message in a message. Its length stands before it: a byte if it is short, as a joint's always is; otherwise the
 /// message moves up.
-fn nested(buffer: &mut Vec<u8>, number: u32, fill: impl FnOnce(&mut Vec<u8>)) {
+pub(super) fn nested(buffer: &mut Vec<u8>, number: u32, fill: impl FnOnce(&mut Vec<u8>)) {
     key(buffer, number, LENGTH);
     let at = buffer.len();
     buffer.push(0);
@@ -182,7 +182,7 @@ fn nested(buffer: &mut Vec<u8>, number: u32, fill: impl FnOnce(&mut Vec<u8>)) {
 }
 
 /// A whole number or a truth value; zero is not written, as is the rule.
-fn whole(buffer: &mut Vec<u8>, number: u32, value: u64) {
+pub(super) fn whole(buffer: &mut Vec<u8>, number: u32, value: u64) {
     if value != 0 {
         key(buffer, number, VARINT);
         varint(buffer, value);
@@ -196,11 +196,16 @@ fn float(buffer: &mut Vec<u8>, number: u32, value: f32) {
     }
 }
 
-fn double(buffer: &mut Vec<u8>, number: u32, value: f64) {
+pub(super) fn double(buffer: &mut Vec<u8>, number: u32, value: f64) {
     if value.to_bits() != 0 {
-        key(buffer, number, EIGHT_BYTES);
-        buffer.extend_from_slice(&value.to_le_bytes());
+        present_double(buffer, number, value);
     }
+}
+
+/// A number that could be absent: zero is written, too.
+pub(super) fn present_double(buffer: &mut Vec<u8>, number: u32, value: f64) {
+    key(buffer, number, EIGHT_BYTES);
+    buffer.extend_from_slice(&value.to_le_bytes());
 }
 
 fn key(buffer: &mut Vec<u8>, number: u32, wire_type: u32) {

@@ -12,6 +12,16 @@
 //! | `/NAME/about` | JSON | at the beginning of each session, who the device is, with the whole hand's file where it is known |
 //! | `/NAME/parameters` | JSON | the parameters in force, and each that changes |
 //!
+//! A simulation tells, at each tick, the true state of its world as well, as tools know it, in protobuf:
+//!
+//! | topic | schema | what |
+//! |---|---|---|
+//! | `/truth/object` | `foxglove.FrameTransform` | pose of the frame `object`, whose origin is the centre of mass, in the hand's `base` |
+//! | `/truth/joints` | `foxglove.JointStates` | true angle and speed of each joint, and the torque on it |
+//! | `/truth/contacts` | `blindgrasp.Contacts` | for each finger the contact point and the force on the object, in `base` |
+//!
+//! and has its shapes as attachments: `hand.urdf`, and `object.obj`, in metres and in the frame `object`.
+//!
 //! Raw payloads are what counts: what is decoded follows from them, here and in whoever reads. Decoded channels are for
 //! the tools that people have.
 //!
@@ -36,7 +46,7 @@ pub use decoder::{Arrival, Decoded, Decoder, Record};
 pub use error::RecordingError;
 pub use message::{Level, LinkStatus};
 pub use reader::{Damage, Entries, Entry, Place, Recording, What};
-pub use writer::{Saved, Writer};
+pub use writer::{Saved, World, Writer};
 
 use std::collections::BTreeMap;
 

@@ -208,18 +208,7 @@ pub(super) fn of_link() -> Vec<u8> {
 
 /// The schema of events, which viewers know.
 pub(super) fn of_log() -> Vec<u8> {
-    let timestamp = FileDescriptorProto {
-        name: Some("google/protobuf/timestamp.proto".into()),
-        ..file(
-            "google.protobuf",
-            vec![message(
-                "Timestamp",
-                vec![field("seconds", 1, Type::Int64), field("nanos", 2, Type::Int32)],
-            )],
-        )
-    };
     let levels = ["UNKNOWN", "DEBUG", "INFO", "WARNING", "ERROR", "FATAL"];
-    let typed = |field, name: &str| FieldDescriptorProto { type_name: Some(name.into()), ..field };
     let log = DescriptorProto {
         enum_type: vec![enumeration("Level", levels.iter().map(|&name| name.to_owned()).zip(0..))],
         ..message(
@@ -236,10 +225,10 @@ pub(super) fn of_log() -> Vec<u8> {
     };
     let log = FileDescriptorProto {
         name: Some("foxglove/Log.proto".into()),
-        dependency: vec!["google/protobuf/timestamp.proto".into()],
+        dependency: vec![TIMESTAMP.into()],
         ..file("foxglove", vec![log])
     };
-    FileDescriptorSet { file: vec![timestamp, log] }.encode_to_vec()
+    FileDescriptorSet { file: vec![timestamp(), log] }.encode_to_vec()
 }
 
 /// JSON schema of what a device is.
@@ -311,7 +300,24 @@ fn fields(signals: &[LinkSignal]) -> Vec<FieldDescriptorProto> {
     signals.iter().map(|signal| field(signal.name, signal.number as i32, signal.kind)).collect()
 }
 
-fn field(name: &str, number: i32, kind: Type) -> FieldDescriptorProto {
+/// The file of protobuf's own times.
+pub(super) const TIMESTAMP: &str = "google/protobuf/timestamp.proto";
+
+/// Protobuf's own times.
+pub(super) fn timestamp() -> FileDescriptorProto {
+    let fields = vec![field("seconds", 1, Type::Int64), field("nanos", 2, Type::Int32)];
+    FileDescriptorProto {
+        name: Some(TIMESTAMP.into()),
+        ..file("google.protobuf", vec![message("Timestamp", fields)])
+    }
+}
+
+/// A field that is a message or an enumeration of this name.
+pub(super) fn typed(field: FieldDescriptorProto, name: &str) -> FieldDescriptorProto {
+    FieldDescriptorProto { type_name: Some(name.into()), ..field }
+}
+
+pub(super) fn field(name: &str, number: i32, kind: Type) -> FieldDescriptorProto {
     FieldDescriptorProto {
         name: Some(name.into()),
         number: Some(number),
@@ -321,13 +327,15 @@ fn field(name: &str, number: i32, kind: Type) -> FieldDescriptorProto {
     }
 }
 
-/// A message. Its field `count` can be absent, which in this syntax takes a choice with one member.
-fn message(name: &str, mut fields: Vec<FieldDescriptorProto>) -> DescriptorProto {
+/// A message. A field that can be absent takes, in this syntax, a choice with one member; so can the `count` of a joint.
+pub(super) fn message(name: &str, mut fields: Vec<FieldDescriptorProto>) -> DescriptorProto {
     let mut choices = Vec::new();
-    for field in fields.iter_mut().filter(|field| field.name() == "count" && name == "Joint") {
+    let is_count = |field: &FieldDescriptorProto| field.name() == "count" && name == "Joint";
+    for field in fields.iter_mut().filter(|field| field.proto3_optional() || is_count(field)) {
         field.proto3_optional = Some(true);
         field.oneof_index = Some(choices.len() as i32);
-        choices.push(prost_types::OneofDescriptorProto { name: Some("_count".into()), options: None });
+        let name = Some(format!("_{}", field.name()));
+        choices.push(prost_types::OneofDescriptorProto { name, options: None });
     }
     DescriptorProto {
         name: Some(name.into()),
@@ -351,7 +359,7 @@ fn enumeration(name: &str, values: impl Iterator<Item = (String, i32)>) -> EnumD
     }
 }
 
-fn file(package: &str, messages: Vec<DescriptorProto>) -> FileDescriptorProto {
+pub(super) fn file(package: &str, messages: Vec<DescriptorProto>) -> FileDescriptorProto {
     FileDescriptorProto {
         name: Some(format!("{}.proto", package.replace('.', "/"))),
         package: Some(package.into()),

@@ -1,5 +1,9 @@
 //! Writing a recording.
 
+mod world;
+
+pub use world::World;
+
 use super::about::{About, Setting};
 use super::decoder::{Arrival, Decoded, Track};
 use super::error::RecordingError;
