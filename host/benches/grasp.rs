@@ -158,7 +158,7 @@ fn run(criterion: &mut Criterion) {
     for name in ["cube", "prism", "hand-arm"] {
         let scene = Scene::load(name, &["duration_s=1.0".to_owned()]).expect("the scene is built in");
         group.bench_function(format!("{name}, 1 s simulated"), |bencher| {
-            bencher.iter(|| Simulation::new(&scene).expect("a simulation").run(|_| {}));
+            bencher.iter(|| Simulation::new(&scene).expect("a simulation").run());
         });
     }
     group.finish();

@@ -16,9 +16,11 @@ use std::path::Path;
 fn said(folder: &Path, duration_s: f64, inputs: bool) -> Vec<Entry> {
     let scene = Scene::load("cube", &[format!("duration_s={duration_s:?}")]).unwrap();
     let path = folder.join("source.mcap");
-    let simulation = Simulation::new(&scene).unwrap();
+    let mut simulation = Simulation::new(&scene).unwrap();
     let mut recorder = Recorder::create(&path, true, &scene, simulation.controller()).unwrap();
-    simulation.run_watched(|_| {}, |controller| recorder.tick(controller));
+    while let Ok(Some(step)) = simulation.step() {
+        recorder.see(&step);
+    }
     recorder.finish().unwrap();
     let mut entries: Vec<Entry> =
         Recording::open(&path).unwrap().entries().unwrap().map(Result::unwrap).collect();

@@ -8,7 +8,7 @@ Every checksum is looked at. Numbers that are not known (NaN) are null.
 import json
 import math
 import sys
-from collections import Counter
+from collections import Counter, defaultdict
 
 from google.protobuf.json_format import MessageToDict
 from mcap.reader import make_reader
@@ -43,6 +43,7 @@ def tick(topic, message, decoded):
 
 def main(path):
     counts, ticks, events, about, parameters = Counter(), [], [], [], []
+    truth = defaultdict(list)
     with open(path, "rb") as file:
         reader = make_reader(file, validate_crcs=True)
         for _, channel, _ in reader.iter_messages():
@@ -52,12 +53,14 @@ def main(path):
     with open(path, "rb") as file:
         reader = make_reader(file, decoder_factories=[DecoderFactory()])
         finished = reader.get_summary() is not None
-        topics = [topic for topic in counts if topic.split("/")[2] in ("tick", "event")]
+        topics = [t for t in counts if t.split("/")[2] in ("tick", "event") or t.startswith("/truth/")]
         for _, channel, message, decoded in reader.iter_decoded_messages(topics=topics):
             if channel.topic.endswith("/tick"):
                 ticks.append(tick(channel.topic, message, decoded))
-            else:
+            elif channel.topic.endswith("/event"):
                 events.append(MessageToDict(decoded))
+            else:
+                truth[channel.topic].append(MessageToDict(decoded, preserving_proto_field_name=True))
         for _, channel, message in reader.iter_messages():
             if channel.topic.endswith("/about"):
                 about.append(json.loads(message.data))
@@ -69,6 +72,7 @@ def main(path):
             "counts": counts,
             "ticks": ticks,
             "events": events,
+            "truth": truth,
             "about": about,
             "parameters": parameters,
             "signals": signals,

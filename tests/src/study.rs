@@ -126,7 +126,7 @@ pub fn spread<T: Sync, R: Send>(things: &[T], work: impl Fn(&T) -> R + Sync) -> 
 /// # Panics
 /// If something is not a number.
 pub fn simulate(scene: &Scene) -> Summary {
-    let run = Simulation::new(scene).expect("a scene that was built can be simulated").run(|_| {});
+    let run = Simulation::new(scene).expect("a scene that was built can be simulated").run();
     for sample in &run.samples {
         let values = sample.speeds_rad_s.iter().chain(sample.position_m.iter()).chain([&sample.energy_j]);
         assert!(values.into_iter().all(|v| v.is_finite()), "not finite at {} s", sample.t_s);

@@ -192,7 +192,7 @@ pub fn run_with(scene: &Scene, config: &Config<MAX_JOINTS>, course: &Course) -> 
     for injection in &course.injections {
         simulation.inject(*injection);
     }
-    let Ok(run) = simulation.try_run(|_| {});
+    let Ok(run) = simulation.try_run();
     Outcome { run, turned: simulation.controller().turned.clone() }
 }
 

@@ -73,7 +73,7 @@ fn it_equals_the_integral_of_the_speeds() {
     let settings = ["control.attitude_stiffness_nm=0", "control.integral_gain_nm_rad=0.02"];
     let scene = Scene::load("cube", &settings.map(str::to_owned)).expect("the scene");
     let period_s = scene.control.period_s;
-    let run = Simulation::new(&scene).expect("a plant").run(|_| {});
+    let run = Simulation::new(&scene).expect("a plant").run();
     assert!(
         run.summary.grasp_held && run.summary.settled && run.summary.fault.is_none(),
         "{:?}",

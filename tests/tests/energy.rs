@@ -9,7 +9,7 @@ use blindgrasp_tests::numeric::order;
 fn run(scene: &str, settings: &[&str]) -> Run {
     let settings: Vec<String> = settings.iter().map(|&setting| setting.to_owned()).collect();
     let scene = Scene::load(scene, &settings).unwrap_or_else(|error| panic!("{error}"));
-    Simulation::new(&scene).expect("the scene can be simulated").run(|_| {})
+    Simulation::new(&scene).expect("the scene can be simulated").run()
 }
 
 /// Returns the energy that is missing at a sample, J.
@@ -75,7 +75,7 @@ fn dampers_and_friction_only_take() {
             .iter()
             .map(|joint| 0.5 * joint.friction.coulomb_nm * joint.friction.presliding_rad)
             .sum();
-        let samples = Simulation::new(&scene).expect("the scene can be simulated").run(|_| {}).samples;
+        let samples = Simulation::new(&scene).expect("the scene can be simulated").run().samples;
         let mut most = 0.0_f64;
         for pair in samples.windows(2) {
             let (before, now) = (pair[0].energies, pair[1].energies);

@@ -59,7 +59,7 @@ fn load(name: &str, settings: &[&str]) -> Scene {
 }
 
 fn run(name: &str, settings: &[&str]) -> Run {
-    Simulation::new(&load(name, settings)).expect("the scene can be simulated").run(|_| {})
+    Simulation::new(&load(name, settings)).expect("the scene can be simulated").run()
 }
 
 /// A frame that walks along a chain.

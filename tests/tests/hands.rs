@@ -19,7 +19,7 @@ fn load(name: &str, settings: &[&str]) -> Scene {
 }
 
 fn run(scene: &Scene) -> Run {
-    Simulation::new(scene).expect("the scene can be simulated").run(|_| {})
+    Simulation::new(scene).expect("the scene can be simulated").run()
 }
 
 /// Returns how far from Eq. 57 friction of the joints lets the normal force of each finger come to rest, N, if it held

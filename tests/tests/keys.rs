@@ -269,7 +269,7 @@ fn the_document_has_the_most_useful_settings_with_what_they_do() {
     let row = |(scene, settings, purpose): &(&str, &[&str], &str)| {
         let settings: Vec<String> = settings.iter().map(|&setting| setting.to_owned()).collect();
         let scene = Scene::load(scene, &settings).unwrap_or_else(|error| panic!("{error}"));
-        let summary = Simulation::new(&scene).expect("a scene that can be simulated").run(|_| {}).summary;
+        let summary = Simulation::new(&scene).expect("a scene that can be simulated").run().summary;
         let outcome = match (summary.lost_at_s, &summary.lost_reason, summary.settle_time_s) {
             (Some(lost_at_s), Some(reason), _) => format!("**lost** at {lost_at_s:.2} s: {reason}"),
             (_, _, Some(t_s)) => format!("held, at rest from {t_s:.2} s"),

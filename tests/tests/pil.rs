@@ -77,7 +77,7 @@ fn looped(scene: &Scene, transport: impl Transport, injections: &[Injection]) ->
     let mut simulation = Simulation::with_controller(scene, Pilot::new(&plan, linked))
         .unwrap_or_else(|error| panic!("{error}"));
     injections.iter().for_each(|injection| simulation.inject(*injection));
-    let run = simulation.try_run(|_| {}).unwrap_or_else(|error| panic!("{error}"));
+    let run = simulation.try_run().unwrap_or_else(|error| panic!("{error}"));
     let linked = simulation.controller().peer();
     let (comparison, traffic) = (linked.comparison(), linked.traffic());
     assert_eq!((traffic.frames_damaged, traffic.frames_unexpected), (0, 0), "{traffic}");
@@ -96,7 +96,7 @@ fn twin(scene: &Scene, injections: &[Injection]) -> Run {
     let mut simulation =
         Simulation::with_controller(scene, Pilot::new(&plan, twin)).unwrap_or_else(|error| panic!("{error}"));
     injections.iter().for_each(|injection| simulation.inject(*injection));
-    simulation.try_run(|_| {}).unwrap_or_else(|error| panic!("{error}"))
+    simulation.try_run().unwrap_or_else(|error| panic!("{error}"))
 }
 
 /// Everything that moved, bit for bit.
@@ -132,7 +132,7 @@ fn grasps(name: &str, hand: &str, ticks: u32, settings: &[&str]) {
     assert_eq!(looped.run.samples.len(), ticks as usize);
     assert_eq!(looped.bits_differ, 0, "{}", looped.compared);
     assert!(summary.grasp_held && summary.settled && summary.fault.is_none(), "{summary:?}");
-    let alone = Simulation::new(&scene).unwrap_or_else(|error| panic!("{error}")).run(|_| {});
+    let alone = Simulation::new(&scene).unwrap_or_else(|error| panic!("{error}")).run();
     assert_same(&looped.run, &alone);
 }
 
@@ -202,7 +202,7 @@ fn the_serial_port_brings_the_same_bits() {
         looped.exchanges_per_s
     );
     assert_eq!(looped.bits_differ, 0, "{}", looped.compared);
-    assert_same(&looped.run, &Simulation::new(&scene).unwrap_or_else(|error| panic!("{error}")).run(|_| {}));
+    assert_same(&looped.run, &Simulation::new(&scene).unwrap_or_else(|error| panic!("{error}")).run());
 }
 
 /// Something goes wrong in a grasp: the firmware finds the same fault in the same tick as the host, has no torque then, and

@@ -15,7 +15,7 @@ fn pushed(name: &str, settings: &[&str], pushes: &[PushFile]) -> blindgrasp::sim
     let mut file = Scene::load(name, &settings).unwrap_or_else(|error| panic!("{error}")).file;
     file.plant.pushes = pushes.to_vec();
     let scene = Scene::build(file).unwrap_or_else(|error| panic!("{error}"));
-    Simulation::new(&scene).expect("a plant").run(|_| {})
+    Simulation::new(&scene).expect("a plant").run()
 }
 
 fn sideways() -> PushFile {

@@ -58,7 +58,7 @@ fn scenes_with_odd_numbers_are_refused_or_run() {
                     continue;
                 }
             };
-            let run = simulation.run(|_| {});
+            let run = simulation.run();
             for sample in &run.samples {
                 assert!(
                     sample.speeds_rad_s.iter().chain(&sample.torques_nm).all(|v| v.is_finite()),

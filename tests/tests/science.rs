@@ -7,7 +7,7 @@ use blindgrasp::sim::{Run, Simulation};
 fn run(scene: &str, settings: &[&str]) -> Run {
     let settings: Vec<String> = settings.iter().map(|&setting| setting.to_owned()).collect();
     let scene = Scene::load(scene, &settings).unwrap_or_else(|error| panic!("{error}"));
-    Simulation::new(&scene).expect("the scene can be simulated").run(|_| {})
+    Simulation::new(&scene).expect("the scene can be simulated").run()
 }
 
 /// Largest relative difference of the normal forces from Eq. 57.

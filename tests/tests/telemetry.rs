@@ -291,7 +291,7 @@ fn every_tick_of_a_shaken_grasp_is_told_of_at_one_megabaud() {
     let scene = Scene::load("cube", &settings).expect("the scene");
     let config = hand_config();
     let mut simulation = Simulation::with_controller(&scene, Line::new(&config, 1e6)).expect("a plant");
-    let Ok(run) = simulation.try_run(|_| {});
+    let Ok(run) = simulation.try_run();
     let line = simulation.controller();
     line.print("1 Mbaud, a grasp that is shaken");
     assert!(run.summary.grasp_held && run.summary.fault.is_none(), "{:?}", run.summary);

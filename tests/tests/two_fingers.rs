@@ -7,7 +7,7 @@ use blindgrasp::sim::summary::Summary;
 fn run(settings: &[&str]) -> Summary {
     let settings: Vec<String> = settings.iter().map(|&setting| setting.to_owned()).collect();
     let scene = Scene::load("two-finger-prism", &settings).unwrap_or_else(|error| panic!("{error}"));
-    Simulation::new(&scene).expect("the scene can be simulated").run(|_| {}).summary
+    Simulation::new(&scene).expect("the scene can be simulated").run().summary
 }
 
 /// As shipped, turned, off the middle, and with the weight of the object.

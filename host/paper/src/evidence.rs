@@ -104,7 +104,7 @@ impl Evidence {
         let one = |planned: &Planned| {
             let settings: Vec<String> = planned.settings.iter().map(|&setting| setting.to_owned()).collect();
             let scene = scene(planned.name, planned.scene, &settings)?;
-            let run = simulation(planned.name, &scene)?.run(|_| {});
+            let run = simulation(planned.name, &scene)?.run();
             told(planned.name);
             Ok(Done { name: planned.name.to_owned(), what: planned.what.to_owned(), settings, scene, run })
         };

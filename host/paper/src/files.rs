@@ -66,7 +66,7 @@ pub fn write(directory: &RunDir, paper: &Paper) -> Result<(), FilesError> {
     let traces = directory.below("traces");
     traces.create()?;
     for done in paper.evidence.runs.iter().filter(|done| TRACES.contains(&done.name.as_str())) {
-        let fill = |file: &mut dyn io::Write| csv::write(file, &done.run.samples).map_err(io::Error::other);
+        let fill = |file: &mut dyn io::Write| csv::write(file, &done.run.samples);
         traces.write(&format!("{}.csv", done.name), fill)?;
     }
     Ok(())

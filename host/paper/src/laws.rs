@@ -120,7 +120,9 @@ impl Grasped {
             let mut file = file.clone();
             case.law.set(&mut file.control, case.gain);
             file.control.period_s = period_s;
-            Ok(Lost::of(&simulation(run, &built(run, file)?)?.run_summed(|_| true)))
+            let mut simulation = simulation(run, &built(run, file)?)?;
+            while let Ok(Some(_)) = simulation.step() {}
+            Ok(Lost::of(&simulation.summary()))
         };
         let at_its_rate = lost(file.control.period_s)?;
         let lost_at_10_khz = match &at_its_rate {

@@ -2,29 +2,61 @@
 
 use super::sample::{ContactSample, Sample};
 use blindgrasp_shared::control::GAINS;
-use std::io::Write;
+use std::io::{self, Write};
 
-/// Writes samples with a header. Numbers are in the shortest form that reads back as the same bits.
+/// Samples on their way to a file, with a header. Numbers are in the shortest form that reads back as the same bits.
+pub struct Trace<W: Write> {
+    writer: csv::Writer<W>,
+    row: Vec<f64>,
+    failure: Option<csv::Error>,
+}
+
+impl<W: Write> Trace<W> {
+    /// Begins a trace.
+    pub fn new(to: W) -> Self {
+        Self { writer: csv::Writer::from_writer(to), row: Vec::new(), failure: None }
+    }
+
+    /// Takes the next sample. What can't be written ends the trace, and is told at its end.
+    pub fn see(&mut self, sample: &Sample) {
+        if self.failure.is_none() {
+            self.failure = self.write(sample).err();
+        }
+    }
+
+    fn write(&mut self, sample: &Sample) -> Result<(), csv::Error> {
+        if self.row.is_empty() {
+            self.writer.write_record(header(sample.angles_rad.len(), sample.contacts.len()))?;
+        }
+        self.row.clear();
+        fill(&mut self.row, sample);
+        for value in &self.row {
+            self.writer.write_field(value.to_string())?;
+        }
+        self.writer.write_field(sample.mode)?;
+        self.writer.write_record(None::<&[u8]>)
+    }
+
+    /// Ends the trace.
+    ///
+    /// # Errors
+    /// What went wrong since its beginning.
+    pub fn finish(mut self) -> io::Result<()> {
+        match self.failure {
+            Some(failure) => Err(failure.into()),
+            None => self.writer.flush(),
+        }
+    }
+}
+
+/// Writes all samples of a run.
 ///
 /// # Errors
 /// What the writer says.
-pub fn write(to: impl Write, samples: &[Sample]) -> Result<(), csv::Error> {
-    let mut writer = csv::Writer::from_writer(to);
-    if let Some(first) = samples.first() {
-        writer.write_record(header(first.angles_rad.len(), first.contacts.len()))?;
-    }
-    let mut row = Vec::new();
-    for sample in samples {
-        row.clear();
-        fill(&mut row, sample);
-        for value in &row {
-            writer.write_field(value.to_string())?;
-        }
-        writer.write_field(sample.mode)?;
-        writer.write_record(None::<&[u8]>)?;
-    }
-    writer.flush()?;
-    Ok(())
+pub fn write(to: impl Write, samples: &[Sample]) -> io::Result<()> {
+    let mut trace = Trace::new(to);
+    samples.iter().for_each(|sample| trace.see(sample));
+    trace.finish()
 }
 
 /// Column names: joints and fingers count from 1. SI units throughout: rad, rad/s, N m, m, m/s, N, J.

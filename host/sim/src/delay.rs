@@ -30,7 +30,6 @@ impl Delay {
 mod tests {
     use super::*;
     use crate::Simulation;
-    use crate::controller::Alone;
     use blindgrasp_model::Scene;
 
     /// The torques on the joints are those that the controller wanted so many ticks before, or when it was armed.
@@ -39,15 +38,18 @@ mod tests {
         for ticks in [0, 1, 5] {
             let set = ["duration_s=0.2".to_owned(), format!("actuators.output_delay_ticks={ticks}")];
             let scene = Scene::load("cube", &set).unwrap();
-            let mut wanted_nm = Vec::new();
-            let watch = |alone: &Alone| wanted_nm.push(alone.record().unwrap().torques_nm);
-            let run = Simulation::new(&scene).unwrap().run_watched(|_| {}, watch);
-            assert!(run.summary.grasp_held && run.samples.len() == 201);
-            for (tick, sample) in run.samples.iter().enumerate() {
+            let (mut wanted_nm, mut applied_nm) = (Vec::new(), Vec::new());
+            let mut simulation = Simulation::new(&scene).unwrap();
+            while let Ok(Some(step)) = simulation.step() {
+                wanted_nm.push(step.controller.record().unwrap().torques_nm);
+                applied_nm.extend(step.sample.map(|sample| sample.torques_nm.clone()));
+            }
+            assert!(simulation.summary().grasp_held && applied_nm.len() == 201);
+            for (tick, applied_nm) in applied_nm.into_iter().enumerate() {
                 // The first that it wanted was for the tick that armed it.
                 let then = &wanted_nm[(tick + 1).saturating_sub(ticks)];
                 let then: Vec<f64> = then.as_slice().iter().map(|torque| f64::from(*torque)).collect();
-                assert_eq!(sample.torques_nm, then, "{tick}");
+                assert_eq!(applied_nm, then, "{tick}");
             }
         }
     }

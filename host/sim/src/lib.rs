@@ -7,7 +7,7 @@
 //! 3. **Actuate**: the amplifiers hold, for one period, the torques of the tick before (the one-cycle output delay of a
 //!    controller that reads first and writes last; or as many ticks before as the scene says), within what the motors can do.
 //! 4. **Plant**: sub-steps up to the next period. Friction of the joints is the plant's.
-//! 5. **Record**: the state at the beginning of the period.
+//! 5. **Sample**: the state at the beginning of the period, for whoever listens to the stream of [`Step`]s.
 //!
 //! Time 0 is the tick that is told to grasp. Before it the hand is armed while everything stands still, which starts the
 //! estimator. Everything is deterministic: the same scene and seed give the same bytes.
@@ -23,6 +23,7 @@ pub mod recorder;
 pub mod run_dir;
 pub mod sample;
 pub mod summary;
+pub mod thinned;
 
 use crate::sample::Sample;
 use blindgrasp_body::MAX_JOINTS;
@@ -42,7 +43,7 @@ use motors::Motors;
 use nalgebra::Vector3;
 use observe::{Observer, Seen};
 use std::num::NonZeroU64;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 use summary::{Ending, Summary, Tally};
 
 /// The reason for which a scene can't be simulated.
@@ -56,6 +57,17 @@ pub enum SimulationError {
     Control(#[from] ParameterError),
 }
 
+/// One step of a run: a tick of the controller, and the world at that tick.
+#[derive(Debug)]
+pub struct Step<'a, C> {
+    /// Time of the tick, s; 0 also of the first step, which arms the hand.
+    pub t_s: f64,
+    /// The controller after its tick.
+    pub controller: &'a C,
+    /// The world; `None` while the hand is armed, between two samples, and where the grasp is lost at this very instant.
+    pub sample: Option<&'a Sample>,
+}
+
 /// A finished run.
 #[derive(Clone, Debug)]
 pub struct Run {
@@ -67,20 +79,8 @@ pub struct Run {
     pub summary: Summary,
 }
 
-/// A run that came to its end.
-struct Driven {
-    first_fault: Option<(u64, Raised)>,
-    tally: Tally,
-    ending: Ending,
-}
-
-impl Driven {
-    fn summary(self, last: Option<&Sample>) -> Summary {
-        self.tally.summary(self.ending, last)
-    }
-}
-
-/// A scene, ready to run with a controller.
+/// A scene with a controller, as a stream of [`Step`]s. Nothing of a step is kept but what the verdict needs, so that an hour
+/// takes no more memory than a second.
 pub struct Simulation<C = Alone> {
     name: String,
     joint_names: Vec<String>,
@@ -98,6 +98,16 @@ pub struct Simulation<C = Alone> {
     controller: C,
     plant: Plant,
     observer: Observer,
+    /// Torques on their way to the motors; `None` until the hand is armed.
+    delay: Option<Delay>,
+    /// The next tick.
+    tick: u64,
+    last: Option<Sample>,
+    tally: Tally,
+    first_fault: Option<(u64, Raised)>,
+    fault: Option<Raised>,
+    lost: Option<(f64, Lost)>,
+    computing: Duration,
 }
 
 impl Simulation {
@@ -109,23 +119,10 @@ impl Simulation {
         Self::with_controller(scene, Alone::new(scene)?)
     }
 
-    /// Runs to the end, or until the grasp is lost. `progress` is told the simulated time once in a while.
-    pub fn run(self, progress: impl FnMut(f64)) -> Run {
-        self.run_watched(progress, |_| {})
-    }
-
-    /// Runs as [`Self::run`], and shows the controller after each of its ticks, the one that arms the hand included.
-    pub fn run_watched(mut self, progress: impl FnMut(f64), watch: impl FnMut(&Alone)) -> Run {
-        let Ok(run) = self.try_run_watched(progress, watch);
+    /// Runs to the end, or until the grasp is lost, and keeps all samples.
+    pub fn run(mut self) -> Run {
+        let Ok(run) = self.try_run();
         run
-    }
-
-    /// Runs for the verdict alone: samples are summed up as they come, and not kept. `goes_on` is told the simulated time once
-    /// in a while; where it says no, the run ends there.
-    pub fn run_summed(mut self, goes_on: impl FnMut(f64) -> bool) -> Summary {
-        let mut last = None;
-        let Ok(driven) = self.drive(goes_on, |_| {}, |sample| last = Some(sample));
-        driven.summary(last.as_ref())
     }
 }
 
@@ -151,10 +148,18 @@ impl<C: Controller> Simulation<C> {
             observer: Observer::new(laws(scene)?, &plant),
             controller,
             plant,
+            delay: None,
+            tick: 0,
+            last: None,
+            tally: Tally::default(),
+            first_fault: None,
+            fault: None,
+            lost: None,
+            computing: Duration::ZERO,
         })
     }
 
-    /// Keeps one sample in so many ticks instead of one a tick, and that of the last.
+    /// Makes one sample in so many ticks instead of one a tick, and that of the last.
     pub fn sample_every(&mut self, ticks: NonZeroU64) {
         self.sample_ticks = ticks.get();
     }
@@ -174,69 +179,57 @@ impl<C: Controller> Simulation<C> {
         &self.controller
     }
 
-    /// Runs to the end, or until the grasp is lost, or until the controller can't go on. `progress` is told the
-    /// simulated time once in a while.
+    /// The next tick; `None` when time is over, or the grasp is lost. The first arms the hand, while everything stands still.
     ///
     /// # Errors
     /// Why the controller can't go on.
-    pub fn try_run(&mut self, progress: impl FnMut(f64)) -> Result<Run, C::Error> {
-        self.try_run_watched(progress, |_| {})
-    }
-
-    fn try_run_watched(
-        &mut self,
-        mut progress: impl FnMut(f64),
-        watch: impl FnMut(&C),
-    ) -> Result<Run, C::Error> {
-        let mut samples = Vec::with_capacity(self.ticks as usize + 1);
-        let goes_on = |t_s| {
-            progress(t_s);
-            true
-        };
-        let driven = self.drive(goes_on, watch, |sample| samples.push(sample))?;
-        Ok(Run { first_fault: driven.first_fault, summary: driven.summary(samples.last()), samples })
-    }
-
-    /// The loop. `keep` gets a sample a tick.
-    fn drive(
-        &mut self,
-        mut goes_on: impl FnMut(f64) -> bool,
-        mut watch: impl FnMut(&C),
-        mut keep: impl FnMut(Sample),
-    ) -> Result<Driven, C::Error> {
-        // The hand is armed while everything stands still.
-        let mut stepped = self.control(None, Some(Command::Arm))?;
-        watch(&self.controller);
-        let mut delay = Delay::new(self.delay_ticks, stepped.torques_nm);
-        let begun = Instant::now();
-        let mut tally = Tally::default();
-        let mut first_fault = None;
-        let mut lost = None;
-        let mut duration_s = self.time_s(self.ticks);
-        for tick in 0..=self.ticks {
-            let t_s = self.time_s(tick);
-            if tick % 100 == 0 && !goes_on(t_s) {
-                duration_s = t_s;
-                break;
-            }
-            // 1, 2: sense and control. The first tick is told to grasp.
-            stepped = self.control(Some(tick), (tick == 0).then_some(Command::Grasp(Grasp::CONFIGURED)))?;
-            watch(&self.controller);
-            first_fault = first_fault.or(stepped.fault.map(|raised| (tick, raised)));
-            let wanted_nm = delay.pass(stepped.torques_nm);
-            let record = |sample: Sample| {
-                tally.see(&sample);
-                keep(sample);
-            };
-            if let Err(reason) = self.move_on(tick, &wanted_nm, &stepped, record) {
-                (lost, duration_s) = (Some(reason), reason.0);
-                break;
-            }
+    pub fn step(&mut self) -> Result<Option<Step<'_, C>>, C::Error> {
+        if self.delay.is_none() {
+            let armed = self.control(None, Some(Command::Arm))?;
+            self.delay = Some(Delay::new(self.delay_ticks, armed.torques_nm));
+            return Ok(Some(Step { t_s: 0.0, controller: &self.controller, sample: None }));
         }
-        let wall_s = begun.elapsed().as_secs_f64();
-        let fault = stepped.fault.map(|raised| self.in_words(raised));
-        let ending = Ending { scene: self.name.clone(), duration_s, lost, fault, wall_s };
-        Ok(Driven { first_fault, tally, ending })
+        if self.lost.is_some() || self.tick > self.ticks {
+            return Ok(None);
+        }
+        let begun = Instant::now();
+        let tick = self.tick;
+        // 1, 2: sense and control. The first tick is told to grasp.
+        let stepped = self.control(Some(tick), (tick == 0).then_some(Command::Grasp(Grasp::CONFIGURED)))?;
+        self.fault = stepped.fault;
+        self.first_fault = self.first_fault.or(stepped.fault.map(|raised| (tick, raised)));
+        let wanted_nm =
+            self.delay.as_mut().map_or(stepped.torques_nm, |delay| delay.pass(stepped.torques_nm));
+        let is_sampled = self.move_on(tick, &wanted_nm, &stepped);
+        self.tick += 1;
+        self.computing += begun.elapsed();
+        let sample = self.last.as_ref().filter(|_| is_sampled);
+        Ok(Some(Step { t_s: self.time_s(tick), controller: &self.controller, sample }))
+    }
+
+    /// The verdict on the run so far.
+    pub fn summary(&self) -> Summary {
+        let end_s = self.time_s(self.tick.min(self.ticks));
+        let ending = Ending {
+            scene: self.name.clone(),
+            duration_s: self.lost.map_or(end_s, |(t_s, _)| t_s),
+            lost: self.lost,
+            fault: self.fault.map(|raised| self.in_words(raised)),
+            wall_s: self.computing.as_secs_f64(),
+        };
+        self.tally.summary(ending, self.last.as_ref())
+    }
+
+    /// Runs to the end, or until the grasp is lost, and keeps all samples.
+    ///
+    /// # Errors
+    /// Why the controller can't go on.
+    pub fn try_run(&mut self) -> Result<Run, C::Error> {
+        let mut samples = Vec::with_capacity(self.ticks as usize + 1);
+        while let Some(step) = self.step()? {
+            samples.extend(step.sample.cloned());
+        }
+        Ok(Run { samples, first_fault: self.first_fault, summary: self.summary() })
     }
 
     /// Time of a tick, s. From whole microseconds, so that it prints as what it is.
@@ -269,26 +262,18 @@ impl<C: Controller> Simulation<C> {
         self.controller.step(&Turn { sensed, late: sensing.late, command, reach: sensing.reach })
     }
 
-    /// Moves the plant on under the torques of one control period.
-    fn move_on(
-        &mut self,
-        tick: u64,
-        wanted_nm: &[f32; MAX_JOINTS],
-        stepped: &Stepped,
-        mut record: impl FnMut(Sample),
-    ) -> Result<(), (f64, Lost)> {
+    /// Moves the plant on under the torques of one control period. Returns `true` if a sample was made.
+    fn move_on(&mut self, tick: u64, wanted_nm: &[f32; MAX_JOINTS], stepped: &Stepped) -> bool {
         let joints = self.joint_names.len();
         let (angles_rad, speeds_rad_s) =
             (stepped.angles_rad.map(f64::from), stepped.speeds_rad_s.map(f64::from));
         let force_share = if self.force_n > 0.0 { f64::from(stepped.force_n / self.force_n) } else { 0.0 };
         let observer = &self.observer;
         let t_s = self.time_s(tick);
-        let sampled = tick.is_multiple_of(self.sample_ticks) || tick == self.ticks;
-        // 3, 4: actuate, plant; 5: record.
+        let is_due = tick.is_multiple_of(self.sample_ticks) || tick == self.ticks;
+        let mut sample = None;
+        // 3, 4: actuate, plant; 5: sample.
         let moved = self.motors.turn(&mut self.plant, wanted_nm, |plant, applied_nm| {
-            if !sampled {
-                return;
-            }
             let seen = Seen {
                 angles_rad: &angles_rad[..joints],
                 speeds_rad_s: &speeds_rad_s[..joints],
@@ -296,12 +281,16 @@ impl<C: Controller> Simulation<C> {
                 force_share,
                 mode: stepped.mode.words(),
             };
-            record(observer.sample(t_s, plant, &seen));
+            sample = is_due.then(|| observer.sample(t_s, plant, &seen));
         });
-        moved.map_err(|(substep, lost)| {
+        self.lost = moved.err().map(|(substep, lost)| {
             let at_s = (self.period_us * substep as u64) as f64 / (1e6 * self.motors.substeps as f64);
             (t_s + at_s, lost)
-        })
+        });
+        let Some(sample) = sample else { return false };
+        self.tally.see(&sample);
+        self.last = Some(sample);
+        true
     }
 }
 

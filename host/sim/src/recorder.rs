@@ -1,12 +1,14 @@
 //! A simulation recorded as a hand would be: the payloads that its device would send, a full record each tick, and
-//! a snapshot of the controller's state in the first and every thousandth.
+//! a snapshot of the controller's state in the first and every thousandth; and beside it the true state of the world.
 //!
 //! There is no link: nothing is sent, nothing is lost, every number is exact, and times count from the start of the run.
 
+use super::Step;
 use super::controller::Alone;
+use super::sample::{ContactSample, Sample};
 use blindgrasp_body::{MAX_FINGERS, MAX_JOINTS};
 use blindgrasp_model::{HandFile, Scene};
-use blindgrasp_record::mcap::{About, Device, RecordingError, Saved, Setting, Stamp, Writer};
+use blindgrasp_record::mcap::{About, Device, RecordingError, Saved, Setting, Stamp, World, Writer};
 use blindgrasp_shared::identity::{Clock, Identity, Image};
 use blindgrasp_shared::link::message::Reply;
 use blindgrasp_shared::telemetry::snapshot::{BYTES_PER_JOINT, PART_BYTES, Part};
@@ -60,6 +62,7 @@ impl Recorder {
         about.hand_hash = about.hand_model().map_or(0, |model| model.hash());
         about.scene = Some(scene.effective_toml());
         let mut writer = Writer::create(path, force)?;
+        writer.add_world(&hand.to_urdf(), &scene.object.to_obj())?;
         let device = writer.add_device("hand");
         writer.about(device, Stamp(0), &about)?;
         writer.parameters(device, Stamp(0), &Setting::all(controller.params()))?;
@@ -67,17 +70,33 @@ impl Recorder {
         Ok(Self { writer, device, period_ns, tick: 0, buffer: Vec::new(), failure: None })
     }
 
-    /// Takes what the controller did in a tick. What can't be written ends the recording, and is told at its end.
-    pub fn tick(&mut self, controller: &Alone) {
+    /// Takes the next step of the run. What can't be written ends the recording, and is told at its end.
+    pub fn see(&mut self, step: &Step<'_, Alone>) {
         if self.failure.is_none() {
-            self.failure = self.write(controller).err();
+            let at = Stamp(self.tick * self.period_ns);
+            let written = self.say_tick(at, step.controller);
+            self.failure =
+                written.and_then(|()| step.sample.map_or(Ok(()), |sample| self.show(at, sample))).err();
             self.tick += 1;
         }
     }
 
-    fn write(&mut self, controller: &Alone) -> Result<(), RecordingError> {
+    fn show(&mut self, at: Stamp, sample: &Sample) -> Result<(), RecordingError> {
+        let contact = |of: &ContactSample| (of.point_m.into(), of.force_on_object_n().into());
+        let contacts: Vec<_> = sample.contacts.iter().map(contact).collect();
+        let world = World {
+            position_m: sample.position_m.into(),
+            attitude: sample.attitude.coords.into(),
+            angles_rad: &sample.angles_rad,
+            speeds_rad_s: &sample.speeds_rad_s,
+            torques_nm: &sample.torques_nm,
+            contacts: &contacts,
+        };
+        self.writer.world(self.device, at, &world)
+    }
+
+    fn say_tick(&mut self, at: Stamp, controller: &Alone) -> Result<(), RecordingError> {
         let Some(record) = controller.record() else { return Ok(()) };
-        let at = Stamp(self.tick * self.period_ns);
         self.say(at, &Reply::Record(record.clone()))?;
         if self.tick.is_multiple_of(SNAPSHOT_TICKS) {
             let mut snapshot = [0; MOST_SNAPSHOT];

@@ -132,6 +132,11 @@ pub struct ContactSample {
 }
 
 impl ContactSample {
+    /// The force on the object, `f C_Y - lambda_X C_X - lambda_Z C_Z`, N.
+    pub fn force_on_object_n(&self) -> Vector3<f64> {
+        self.frame * Vector3::new(-self.lambda_n[0], self.normal_force_n, -self.lambda_n[1])
+    }
+
     /// Tangential force, N.
     pub fn tangential_force_n(&self) -> f64 {
         let [x, z] = self.lambda_n;

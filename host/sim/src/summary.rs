@@ -118,7 +118,7 @@ impl Tally {
     }
 
     /// The verdict on a run whose last sample is `last`.
-    pub fn summary(self, ending: Ending, last: Option<&Sample>) -> Summary {
+    pub fn summary(&self, ending: Ending, last: Option<&Sample>) -> Summary {
         let settle_time_s = if ending.lost.is_none() { self.resting_since_s } else { None };
         Summary {
             scene: ending.scene,
@@ -184,7 +184,7 @@ mod tests {
     fn samples(count: usize, random: &mut fastrand::Rng) -> Vec<Sample> {
         let duration = format!("duration_s={:?}", (count - 1) as f64 / 1e3);
         let scene = Scene::load("prism", &[duration]).unwrap();
-        let mut samples = Simulation::new(&scene).unwrap().run(|_| {}).samples;
+        let mut samples = Simulation::new(&scene).unwrap().run().samples;
         for sample in &mut samples {
             sample.speeds_rad_s.fill(0.0);
             sample.speeds_rad_s[1] = if random.u8(..4) == 0 { -2e-3 } else { -9e-4 };

@@ -115,7 +115,17 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
     let mut simulation = Simulation::with_controller(&scene, Pilot::new(&plan, linked))
         .with_context(|| format!("scene {}", scene.name))?;
     let bar = sim::progress_bar(scene.duration_s);
-    let run = simulation.try_run(|t_s| bar.set_position((t_s * 1e3) as u64));
+    let mut ticks = 0;
+    let ended = loop {
+        match simulation.step() {
+            Ok(Some(step)) => {
+                ticks += usize::from(step.sample.is_some());
+                bar.set_position((step.t_s * 1e3) as u64);
+            }
+            Ok(None) => break Ok(()),
+            Err(error) => break Err(error),
+        }
+    };
     bar.finish_and_clear();
 
     let linked = simulation.controller().peer();
@@ -123,12 +133,12 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
     if let Some(difference) = first_difference {
         eprintln!("blindgrasp: first difference: {difference}");
     }
-    let run = run?;
-    let summary = &run.summary;
+    ended?;
+    let summary = &simulation.summary();
     let report = Report {
-        ticks: run.samples.len(),
+        ticks,
         bits_differ: *bits_differ,
-        exchanges_per_s: run.samples.len() as f64 / summary.wall_s,
+        exchanges_per_s: ticks as f64 / summary.wall_s,
         first_difference: first_difference.as_ref(),
         firmware: linked.firmware().map_or("", |firmware| firmware.words.as_str()),
         link: linked.traffic(),

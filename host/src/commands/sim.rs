@@ -4,17 +4,23 @@ use super::Outcome;
 use anyhow::Context;
 use blindgrasp::model::Scene;
 use blindgrasp::record::mcap::RecordingError;
-use blindgrasp::sim::csv;
+use blindgrasp::sim::Simulation;
+use blindgrasp::sim::csv::Trace;
 use blindgrasp::sim::recorder::Recorder;
-use blindgrasp::sim::run_dir::RunDir;
+use blindgrasp::sim::run_dir::{RunDir, RunDirError};
+use blindgrasp::sim::sample::Sample;
 use blindgrasp::sim::summary::Summary;
-use blindgrasp::sim::{Run, Simulation};
+use blindgrasp::sim::thinned::Thinned;
 use blindgrasp::view;
 use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 use std::fmt::Write as _;
+use std::fs::File;
 use std::io::{self, Write as _};
 use std::path::PathBuf;
+
+/// The file of the samples, in a run's directory.
+const TRACE: &str = "trace.csv";
 
 /// Run a scene in simulation: the controller of the firmware against the simulated hand and object
 ///
@@ -60,7 +66,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
     for warning in &scene.warnings {
         eprintln!("blindgrasp: warning: {warning}");
     }
-    let simulation = Simulation::new(&scene).with_context(|| format!("scene {}", scene.name))?;
+    let mut simulation = Simulation::new(&scene).with_context(|| format!("scene {}", scene.name))?;
     // What can't be written is told after the run, when its summary is safe; not so what is there already.
     let mut recorder = recording.map(|path| {
         // Whether it could be made shows in the next step.
@@ -71,29 +77,31 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
         return Err(error.into());
     }
     let bar = progress_bar(scene.duration_s);
-    let run = simulation.run_watched(
-        |t_s| bar.set_position((t_s * 1e3) as u64),
-        |controller| {
-            if let Some(Ok(recorder)) = &mut recorder {
-                recorder.tick(controller);
-            }
-        },
-    );
+    let mut files = directory.map(Files::begin);
+    while let Ok(Some(step)) = simulation.step() {
+        bar.set_position((step.t_s * 1e3) as u64);
+        if let Some(Ok(recorder)) = &mut recorder {
+            recorder.see(&step);
+        }
+        if let (Some(files), Some(sample)) = (&mut files, step.sample) {
+            files.see(sample);
+        }
+    }
     bar.finish_and_clear();
 
-    let text =
-        if arguments.json { serde_json::to_string(&run.summary)? + "\n" } else { describe(&run.summary) };
+    let summary = simulation.summary();
+    let text = if arguments.json { serde_json::to_string(&summary)? + "\n" } else { describe(&summary) };
     io::stdout().lock().write_all(text.as_bytes()).context("cannot print the summary")?;
     // The recording is nearly all there: what is wrong with it keeps nothing else from being written.
     let recorded = recorder.map_or(Ok(()), |made| made.and_then(Recorder::finish).map(|_| ()));
-    if let Some(directory) = &directory {
-        write_files(directory, &scene, &run)?;
+    if let Some(files) = files {
+        files.write(&scene, &summary)?;
     }
     recorded?;
     if let Some(path) = &arguments.out {
         eprintln!("blindgrasp: wrote {}", path.display());
     }
-    Ok(if run.summary.grasp_held { Outcome::Shown } else { Outcome::Failed })
+    Ok(if summary.grasp_held { Outcome::Shown } else { Outcome::Failed })
 }
 
 /// A bar over simulated milliseconds; hidden where stderr is not a terminal.
@@ -103,28 +111,51 @@ pub(super) fn progress_bar(duration_s: f64) -> ProgressBar {
         .with_style(ProgressStyle::with_template(style).unwrap_or_else(|_| ProgressStyle::default_bar()))
 }
 
-fn write_files(directory: &RunDir, scene: &Scene, run: &Run) -> anyhow::Result<()> {
-    directory.create()?;
-    let summary = serde_json::to_string_pretty(&run.summary)? + "\n";
-    directory.write("summary.json", |file| file.write_all(summary.as_bytes()))?;
-    directory.write("scene.toml", |file| file.write_all(scene.effective_toml().as_bytes()))?;
-    directory.write("trace.csv", |file| csv::write(file, &run.samples).map_err(io::Error::other))?;
-    let joint_names: Vec<String> = scene.joints.iter().map(|joint| joint.name.clone()).collect();
-    let report = view::Report {
-        title: &scene.name,
-        hand: &scene.hand,
-        joint_names: &joint_names,
-        object: &scene.object,
-        samples: &run.samples,
-    };
-    view::write(directory.path(), &report)?;
-    #[cfg(feature = "plots")]
-    blindgrasp::plots::write(directory.path(), &report)?;
-    #[cfg(not(feature = "plots"))]
-    eprintln!(
-        "blindgrasp: no plots: they take `cargo run --release --features plots --` and the same arguments"
-    );
-    Ok(())
+/// The files of a run, beside its recording.
+struct Files {
+    directory: RunDir,
+    trace: io::Result<Trace<File>>,
+    pictured: Thinned,
+}
+
+impl Files {
+    fn begin(directory: RunDir) -> Self {
+        let trace = File::create(directory.path().join(TRACE)).map(Trace::new);
+        Self { directory, trace, pictured: Thinned::default() }
+    }
+
+    fn see(&mut self, sample: &Sample) {
+        if let Ok(trace) = &mut self.trace {
+            trace.see(sample);
+        }
+        self.pictured.see(sample);
+    }
+
+    fn write(self, scene: &Scene, summary: &Summary) -> anyhow::Result<()> {
+        let directory = &self.directory;
+        directory.create()?;
+        let summary = serde_json::to_string_pretty(summary)? + "\n";
+        directory.write("summary.json", |file| file.write_all(summary.as_bytes()))?;
+        directory.write("scene.toml", |file| file.write_all(scene.effective_toml().as_bytes()))?;
+        let path = || directory.path().join(TRACE);
+        self.trace.and_then(Trace::finish).map_err(|source| RunDirError::Io { path: path(), source })?;
+        let joint_names: Vec<String> = scene.joints.iter().map(|joint| joint.name.clone()).collect();
+        let report = view::Report {
+            title: &scene.name,
+            hand: &scene.hand,
+            joint_names: &joint_names,
+            object: &scene.object,
+            samples: &self.pictured.finish(),
+        };
+        view::write(directory.path(), &report)?;
+        #[cfg(feature = "plots")]
+        blindgrasp::plots::write(directory.path(), &report)?;
+        #[cfg(not(feature = "plots"))]
+        eprintln!(
+            "blindgrasp: no plots: they take `cargo run --release --features plots --` and the same arguments"
+        );
+        Ok(())
+    }
 }
 
 /// The summary as a table.

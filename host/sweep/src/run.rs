@@ -74,14 +74,16 @@ fn outcome(plan: &Plan, run: usize, goes_on: impl Fn() -> bool) -> Option<Outcom
         Ok(scene) => scene,
         Err(error) => return Some(Outcome::Refused(error.to_string())),
     };
-    let simulation = match Simulation::new(&scene) {
+    let mut simulation = match Simulation::new(&scene) {
         Ok(simulation) => simulation,
         Err(error) => return Some(Outcome::Refused(format!("scene {}: {error}", scene.name))),
     };
-    let mut is_whole = true;
-    let summary = simulation.run_summed(|_| {
-        is_whole = goes_on();
-        is_whole
-    });
-    is_whole.then(|| Outcome::Ran(Box::new(summary)))
+    for tick in 0_u64.. {
+        match simulation.step() {
+            Ok(None) => break,
+            Ok(Some(_)) if tick.is_multiple_of(100) && !goes_on() => return None,
+            Ok(Some(_)) => {}
+        }
+    }
+    Some(Outcome::Ran(Box::new(simulation.summary())))
 }

@@ -17,7 +17,7 @@ const AT: u64 = 100;
 fn inject<P: Peer>(scene: &Scene, plan: &Plan, peer: P, kind: Kind) -> (Run, Simulation<Pilot<P>>) {
     let mut simulation = Simulation::with_controller(scene, Pilot::new(plan, peer)).expect("a simulation");
     simulation.inject(Injection { at_tick: AT, kind });
-    (simulation.try_run(|_| {}).expect("a run"), simulation)
+    (simulation.try_run().expect("a run"), simulation)
 }
 
 /// Runs it both ways, which have to be one.

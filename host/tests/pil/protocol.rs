@@ -36,7 +36,7 @@ fn run(scene: &Scene, wrong: Wrong) -> (Result<Run, PilError>, Simulation<Pilot<
     let client = Client::new(Firmware::new(scene, wrong), PATIENCE);
     let linked = Linked::connect(&plan, client).expect("a firmware");
     let mut simulation = Simulation::with_controller(scene, Pilot::new(&plan, linked)).expect("a simulation");
-    (simulation.try_run(|_| {}), simulation)
+    (simulation.try_run(), simulation)
 }
 
 /// The error of a run, and how long it took until it was there.
@@ -71,7 +71,7 @@ fn a_run_is_that_of_a_simulation() {
     ];
     for settings in [&[][..], &others] {
         let scene = scene(settings);
-        let alone = Simulation::new(&scene).expect("a simulation").run(|_| {});
+        let alone = Simulation::new(&scene).expect("a simulation").run();
         let (run, simulation) = run(&scene, Wrong::Nothing);
         let run = run.expect("a run");
         let linked = simulation.controller().peer();
@@ -188,7 +188,7 @@ fn a_damaged_or_lost_frame_ends_the_run() {
 #[test]
 fn a_bit_that_differs_is_found_and_acts() {
     let scene = scene(&[]);
-    let alone = Simulation::new(&scene).expect("a simulation").run(|_| {});
+    let alone = Simulation::new(&scene).expect("a simulation").run();
     let (run, simulation) = run(&scene, Wrong::BitAt(ticks_before(&scene) + 20, 5));
     let comparison = simulation.controller().peer().comparison();
     // The twin gets the counts that follow from the firmware's torque: afterwards both do the same again.

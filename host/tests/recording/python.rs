@@ -1,6 +1,7 @@
 //! The Python package `mcap` reads the same as we do.
 
 use crate::hand::{Hand, about, read, settings};
+use blindgrasp::model::Scene;
 use blindgrasp::record::mcap::{Decoded, Decoder, Stamp, What, Writer};
 use blindgrasp_shared::limit::Limit;
 use blindgrasp_shared::parameters::Each;
@@ -78,6 +79,14 @@ fn same_limits(message: &Value, key: &str, ours: Told<'_>) {
     }
 }
 
+/// Returns what Python finds in a recording.
+fn python(path: &Path) -> Value {
+    let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("../tests/python/read_recording.py");
+    let output = Command::new("python3").arg(script).arg(path).output().unwrap();
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    serde_json::from_slice(&output.stdout).unwrap()
+}
+
 #[test]
 #[ignore = "needs the Python packages mcap and mcap-protobuf-support, which tests/run gets"]
 fn python_reads_the_same_values() {
@@ -108,10 +117,7 @@ fn python_reads_the_same_values() {
         } else {
             std::mem::forget(writer);
         }
-        let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("../tests/python/read_recording.py");
-        let output = Command::new("python3").arg(script).arg(&path).output().unwrap();
-        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
-        let told: Value = serde_json::from_slice(&output.stdout).unwrap();
+        let told = python(&path);
         assert_eq!(told["finished"], finish);
         let (entries, _, recording) = read(&path);
         let mut decoder = Decoder::new();
@@ -157,6 +163,42 @@ fn python_reads_the_same_values() {
             told["metadata"]["interface_version"],
             blindgrasp_shared::telemetry::INTERFACE_VERSION.to_string()
         );
+    }
+}
+
+/// The true state that only a simulation knows, by the schemas that stand in the file.
+#[test]
+#[ignore = "needs the Python packages mcap and mcap-protobuf-support, which tests/run gets"]
+fn python_reads_the_true_state_of_the_world() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.mcap");
+    let scene = Scene::load("cube", &["duration_s=0.3".to_owned()]).unwrap();
+    let samples = crate::simulation::run(&scene, &path);
+    let told = python(&path);
+    let truth = |topic: &str| told["truth"][topic].as_array().unwrap();
+    let (objects, joints, contacts) =
+        (truth("/truth/object"), truth("/truth/joints"), truth("/truth/contacts"));
+    assert_eq!([objects.len(), joints.len(), contacts.len()], [samples.len(); 3]);
+    // The parser of JSON may be wrong in the last bit; protobuf leaves out what is zero.
+    let is_same = |told: &Value, ours: f64| (told.as_f64().unwrap_or(0.0) - ours).abs() <= 1e-15 * ours.abs();
+    let is_vector = |told: &Value, ours: nalgebra::Vector3<f64>| {
+        ["x", "y", "z"].into_iter().zip(ours.iter()).all(|(name, ours)| is_same(&told[name], *ours))
+    };
+    for (k, sample) in samples.iter().enumerate() {
+        assert!(is_vector(&objects[k]["translation"], sample.position_m));
+        assert!(is_vector(&objects[k]["rotation"], sample.attitude.imag()));
+        assert!(is_same(&objects[k]["rotation"]["w"], sample.attitude.w));
+        for (j, joint) in scene.joints.iter().enumerate() {
+            let told = &joints[k]["joints"][j];
+            assert_eq!(told["name"], joint.name.as_str());
+            assert!(is_same(&told["position"], sample.angles_rad[j]), "{told}");
+            assert!(is_same(&told["velocity"], sample.speeds_rad_s[j]), "{told}");
+            assert!(is_same(&told["effort"], sample.torques_nm[j]), "{told}");
+        }
+        for (told, ours) in contacts[k]["contacts"].as_array().unwrap().iter().zip(&sample.contacts) {
+            assert!(is_vector(&told["point_m"], ours.point_m), "{told}");
+            assert!(is_vector(&told["force_n"], ours.force_on_object_n()), "{told}");
+        }
     }
 }
 

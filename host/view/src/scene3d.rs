@@ -108,7 +108,7 @@ impl Stage {
 
     /// The force on the object, an arrow that starts at the contact.
     fn add_force(&self, mesh: &mut Mesh, contact: &ContactSample) {
-        let force = force_on_object(contact);
+        let force = contact.force_on_object_n();
         let length = (force.norm() * self.m_per_n).min(1.3 * self.object_radius_m);
         if !(length > 0.02 * self.object_radius_m) {
             return;
@@ -145,11 +145,6 @@ fn edges(object: &Polyhedron) -> Vec<[Vector3<f64>; 2]> {
         .collect()
 }
 
-/// `f C_Y - lambda_X C_X - lambda_Z C_Z`, N.
-fn force_on_object(contact: &ContactSample) -> Vector3<f64> {
-    contact.frame * Vector3::new(-contact.lambda_n[0], contact.normal_force_n, -contact.lambda_n[1])
-}
-
 /// A force that most of the run stays below, so that one impact does not shrink all other arrows, N.
 fn usual_force(samples: &[Sample]) -> f64 {
     let step = samples.len() / 2000 + 1;
@@ -157,7 +152,7 @@ fn usual_force(samples: &[Sample]) -> f64 {
         .iter()
         .step_by(step)
         .flat_map(|sample| &sample.contacts)
-        .map(|contact| force_on_object(contact).norm())
+        .map(|contact| contact.force_on_object_n().norm())
         .filter(|force| *force > 0.0 && force.is_finite())
         .collect();
     forces.sort_by(f64::total_cmp);

@@ -18,7 +18,7 @@ fn done(name: &str, scene: &str, settings: &[&str]) -> Done {
     let settings: Vec<String> =
         settings.iter().chain(&["duration_s=0.05"]).map(|&setting| setting.to_owned()).collect();
     let scene = load(name, scene, &settings).expect("built in");
-    let run = Simulation::new(&scene).expect("it can be simulated").run(|_| {});
+    let run = Simulation::new(&scene).expect("it can be simulated").run();
     Done { name: name.to_owned(), what: String::new(), settings, scene, run }
 }
 

@@ -102,7 +102,7 @@ pub(super) fn carry(told: &(dyn Fn(&str) + Sync)) -> Result<Vec<Carried>, Eviden
         law.set(&mut file.control, gain);
         file.plant.pushes.push(PUSH);
         let scene = built(RUN, file)?;
-        let run = simulation(RUN, &scene)?.run(|_| {});
+        let run = simulation(RUN, &scene)?.run();
         told(RUN);
         Carried::of(law, gain, &scene, &run)
     };

@@ -177,7 +177,7 @@ pub(super) fn follow(told: &(dyn Fn(&str) + Sync)) -> Result<Vec<Final>, Evidenc
         let scene = built(RUN, file)?;
         let mut simulation = simulation(RUN, &scene)?;
         simulation.sample_every(NonZeroU64::new(SAMPLE_TICKS).unwrap_or(NonZeroU64::MIN));
-        let run = simulation.run(|_| {});
+        let run = simulation.run();
         told(RUN);
         Ok(Final::of(*law, *gain, path, &scene, &run))
     };

@@ -29,7 +29,7 @@ fn a_row_is_the_summary_of_the_same_run_with_all_its_samples() {
     assert_eq!(rows.iter().map(|row| row.run).collect::<Vec<_>>(), [0, 1, 2, 3, 4, 5, 6, 7]);
     for row in &rows {
         let scene = plan.scene(row.run).unwrap();
-        let whole = Simulation::new(&scene).unwrap().run(|_| {});
+        let whole = Simulation::new(&scene).unwrap().run();
         assert_eq!(row.summary().map(verdict), Some(verdict(&whole.summary)));
         assert_eq!(plan.seed(row.run), scene.seed);
     }

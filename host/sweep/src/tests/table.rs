@@ -88,7 +88,7 @@ fn the_configuration_of_a_row_reproduces_it() {
         }
         let Cell::Text(text) = cell(&columns, row, "configuration") else { panic!("it has one") };
         let scene = Scene::parse(&text, "row.toml", Path::new(""), &[]).unwrap();
-        let again = Simulation::new(&scene).unwrap().run(|_| {}).summary;
+        let again = Simulation::new(&scene).unwrap().run().summary;
         assert_eq!(cell(&columns, row, "seed"), Cell::Whole(scene.seed.into()));
         let again = Row { run: row.run, outcome: Outcome::Ran(Box::new(again)) };
         for heading in columns.headings().filter(|heading| heading.name != "configuration") {
