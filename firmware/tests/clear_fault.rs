@@ -1,6 +1,6 @@
 //! A fault of the joints is left by the user's command alone, once the tick has taken it: a refused one changes nothing.
 
-mod model;
+use crate::model;
 
 use blindgrasp_firmware::control::{Control, HandBurst};
 use blindgrasp_firmware::joints::ls7366r::FilterClock;

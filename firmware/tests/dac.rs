@@ -1,6 +1,6 @@
 //! The DAC's driver, byte by byte.
 
-mod model;
+use crate::model;
 
 use blindgrasp_firmware::joints::dac::{Dac, DacError};
 use embedded_hal::spi::ErrorKind;

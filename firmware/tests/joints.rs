@@ -1,6 +1,6 @@
 //! The joints of the board, on models of the chips: 12 counters and 3 DACs, or 6 and 2.
 
-mod model;
+use crate::model;
 
 use blindgrasp_firmware::joints::ls7366r::{FilterClock, Zero};
 use blindgrasp_firmware::joints::{BoardJoints, ConfigError, JointsConfig, OutputConfig};

@@ -10,7 +10,7 @@
 //! - **The line**: ten bit times a byte; a transmitter with one byte in work and one waiting, or transfers from the ring.
 //!
 //! The hand is the one that the firmware is built for: 12 joints, and 16 with
-//! `HAND=models/hands/allegro-like.toml cargo test --release -p blindgrasp-firmware --test line -- --show-output`.
+//! `HAND=models/hands/allegro-like.toml cargo test --release -p blindgrasp-firmware --test tasks line -- --show-output`.
 
 use blindgrasp_firmware::control::{Control, HandBurst};
 use blindgrasp_firmware::link::{Link, Port, SentBytes};

@@ -1,6 +1,6 @@
 //! The counter's driver, byte by byte.
 
-mod model;
+use crate::model;
 
 use blindgrasp_firmware::joints::ls7366r::{Counter, CounterError, FilterClock, Zero};
 use blindgrasp_shared::fault::Fault;

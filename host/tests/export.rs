@@ -2,7 +2,7 @@
 
 #![allow(clippy::unwrap_used, reason = "only tests are here")]
 
-mod recorded;
+use crate::recorded;
 
 use blindgrasp::record::export::{Cell, Column, Row};
 use blindgrasp::record::mcap::{Decoded, Decoder, Recording};
@@ -265,7 +265,7 @@ fn a_reader_that_has_seen_enough_is_no_error() {
 }
 
 /// An hour of a hand with 12 joints at full rate, for measuring:
-/// `HOUR=/tmp/hour.mcap cargo test --release -p blindgrasp --test export -- --ignored`.
+/// `HOUR=/tmp/hour.mcap cargo test --release -p blindgrasp --test command export -- --ignored`.
 #[test]
 #[ignore = "writes a recording of some gigabytes, to the path in HOUR"]
 fn an_hour() {

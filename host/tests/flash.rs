@@ -1,7 +1,7 @@
 //! `blindgrasp flash` as a user meets it, as far as that goes without a microcontroller.
 
 #[cfg(feature = "probe")]
-mod elf;
+use crate::elf;
 
 use std::fs;
 use std::path::PathBuf;

@@ -1,6 +1,6 @@
 //! Firmware images, judged without a probe: what is flashed, and what is refused for which reason.
 
-mod elf;
+use crate::elf;
 
 use blindgrasp::device::image::{
     ExpectedHand, Firmware, FitError, Footprint, ImageError, Kind, LEAST_STACK_BYTES, Memory, PurposeError,

@@ -2,7 +2,7 @@
 
 #![cfg(unix)]
 
-mod patient;
+use crate::patient;
 
 use nix::sys::signal::{Signal, kill};
 use nix::sys::termios::{LocalFlags, tcgetattr};

@@ -1,7 +1,7 @@
 //! `examples/python/blindgrasp_client.py` against a simulated hand in real time: the processes that a user would start.
 #![cfg(unix)]
 
-mod patient;
+use crate::patient;
 
 use std::io::{BufRead, BufReader};
 use std::path::Path;

@@ -2,7 +2,7 @@
 //! have other things to do: what happens is waited for, ticks that the simulated hand gave up are told by it, and what is asserted
 //! of time has room for a process that waits for its turn.
 //!
-//!     cargo test --release -p blindgrasp --test record -- --show-output --include-ignored
+//!     cargo test --release -p blindgrasp --test command record -- --show-output --include-ignored
 #![cfg(unix)]
 
 use blindgrasp::record::mcap::{Decoded, Decoder, Recording, Stamp, What};

@@ -2,7 +2,7 @@
 
 #![allow(clippy::unwrap_used, reason = "only tests are here")]
 
-mod recorded;
+use crate::recorded;
 
 use blindgrasp::body::MAX_JOINTS;
 use blindgrasp::record::mcap::{Decoder, Recording};

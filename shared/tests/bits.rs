@@ -1,6 +1,6 @@
 //! The tick gives the same bits everywhere: on every target and at every optimisation, in `f32`.
 
-mod common;
+use crate::common;
 
 use blindgrasp_shared::command::{Command, Grasp};
 use blindgrasp_shared::fault::{Fault, Raised};

@@ -1,6 +1,6 @@
 //! The device: sessions, requests and settings around the tick.
 
-mod common;
+use crate::common;
 
 use blindgrasp_shared::command::{Command, Grasp, Refusal};
 use blindgrasp_shared::control::{GAIN_COUNT, PerGain};

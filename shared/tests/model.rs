@@ -1,6 +1,6 @@
 //! A hand as bytes, there and back.
 
-mod common;
+use crate::common;
 
 use blindgrasp_shared::bytes::BufferTooSmall;
 use blindgrasp_shared::estimate::Encoder;

@@ -1,7 +1,7 @@
 //! The limits that no request can break: make a limit looser than the hand's file, arm without a heartbeat, make a
 //! torque jump, leave a fault by itself.
 
-mod common;
+use crate::common;
 
 use blindgrasp_shared::command::{Command, Grasp};
 use blindgrasp_shared::device::{Device, Inputs};

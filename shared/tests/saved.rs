@@ -1,7 +1,7 @@
 //! Parameters that are saved, and are there again after a start.
 
-mod common;
-mod flash;
+use crate::common;
+use crate::flash;
 
 use blindgrasp_shared::identity::Restored;
 use blindgrasp_shared::parameter::Text;

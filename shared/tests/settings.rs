@@ -1,7 +1,7 @@
 //! Signs, zeros and saved parameters, asked for over the line.
 
-mod common;
-mod flash;
+use crate::common;
+use crate::flash;
 
 use blindgrasp_shared::command::{Command, Grasp, Refusal};
 use blindgrasp_shared::device::{Device, Inputs, Outputs};

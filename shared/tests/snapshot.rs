@@ -1,6 +1,6 @@
 //! A state that was saved and loaded goes on as the one that was not, to the bit; and hostile bytes are refused.
 
-mod common;
+use crate::common;
 
 use blindgrasp_shared::bytes::SnapshotError;
 use blindgrasp_shared::command::{Command, Grasp};

@@ -1,6 +1,6 @@
 //! Saved parameters in a flash in memory, whose power is cut at any byte.
 
-mod flash;
+use crate::flash;
 
 use blindgrasp_shared::parameter::Text;
 use blindgrasp_shared::parameters::Parameter;

@@ -1,6 +1,6 @@
 //! The tick as a whole: modes, limits and faults through the one function.
 
-mod common;
+use crate::common;
 
 use blindgrasp_shared::command::{Answer, Command, Grasp, Refusal};
 use blindgrasp_shared::event::{Event, Events};

@@ -182,7 +182,7 @@ fn random_polyhedra_are_grasped() {
     check(&study(95, 5));
 }
 
-/// The whole table: `cargo test --release -p blindgrasp-tests --test polyhedra whole -- --ignored --nocapture`
+/// The whole table: `cargo test --release -p blindgrasp-tests --test science polyhedra::whole -- --ignored --nocapture`
 #[test]
 #[ignore = "takes minutes; prints the table of the README"]
 fn the_whole_table() {
@@ -244,7 +244,7 @@ fn thirty_faces_are_searched_for_two_to_five_fingers() {
 }
 
 /// The terms of the quality against the outcome: of placements that are not all the best. `cargo test --release -p
-/// blindgrasp-tests --test polyhedra terms -- --ignored --nocapture`
+/// blindgrasp-tests --test science polyhedra::terms -- --ignored --nocapture`
 #[test]
 #[ignore = "takes a minute; prints the evidence for the ranking"]
 fn terms_of_the_quality_predict_the_outcome() {

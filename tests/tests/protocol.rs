@@ -2,7 +2,7 @@
 //! compared. With `BLINDGRASP_BLESS=1` both are written anew; look at the difference then, because a vector that changes
 //! is another interface version.
 //!
-//!     cargo test --release -p blindgrasp-tests --test protocol -- --show-output
+//!     cargo test --release -p blindgrasp-tests --test science protocol -- --show-output
 
 use blindgrasp::body::MAX_JOINTS;
 use blindgrasp::model::HandModel;

@@ -1,7 +1,7 @@
 //! `examples/python/blindgrasp_client.py`, written from `docs/protocol.md` alone, against the test vectors and the emulated
 //! firmware. Against a simulated hand in real time: `host/tests/python_client.rs`.
 //!
-//!     cargo test --release -p blindgrasp-tests --features firmware --test python_client -- --show-output
+//!     cargo test --release -p blindgrasp-tests --features firmware --test science python_client -- --show-output
 #![cfg(unix)]
 
 use blindgrasp_tests::images::root;

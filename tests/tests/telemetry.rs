@@ -1,7 +1,7 @@
 //! The share of the telemetry at full rate that gets through: the device, the queues of the firmware, and a line that
 //! takes so many bytes a millisecond.
 //!
-//!     cargo test --release -p blindgrasp-tests --test telemetry -- --show-output
+//!     cargo test --release -p blindgrasp-tests --test science telemetry -- --show-output
 
 use blindgrasp::body::{MAX_FINGERS, MAX_JOINTS};
 use blindgrasp::model::{HandModel, Scene};

@@ -24,7 +24,7 @@
 //! area under the ROC curve, with which it tells grasps that hold from those that are lost, is 0.91 for the chance, 0.79 for
 //! the turn alone, 0.83 for the largest friction and 0.78 for the unbalanced moment, which say what the turn says; the margin alone
 //! has 0.55, room 0.47 and conditioning 0.51: nothing, in a model without end stops (`cargo test --release -p
-//! blindgrasp-tests --test polyhedra terms -- --ignored --nocapture`).
+//! blindgrasp-tests --test science polyhedra::terms -- --ignored --nocapture`).
 //! The chance is that of the paper's hand and gains; elsewhere it ranks, and promises nothing.
 //!
 //! What **ranks** is the chance, times the room in units of 0.1 rad where it is less: there the soft end stops begin.

@@ -4,9 +4,6 @@
 #[cfg(unix)]
 mod command;
 mod device;
-#[path = "../elf/mod.rs"]
-#[allow(dead_code, reason = "only a good image is needed here")]
-mod elf;
 mod faults;
 mod protocol;
 #[cfg(unix)]
