@@ -3,6 +3,9 @@
 
 #[path = "../../shared/tests/flash/mod.rs"]
 mod flash;
+#[path = "../../shared/tests/random.rs"]
+#[allow(dead_code, reason = "the flash uses its part")]
+mod random;
 
 use blindgrasp::body::{MAX_FINGERS, MAX_JOINTS};
 use blindgrasp::device::talk::{Event, PATIENCE, Talk, TalkError};

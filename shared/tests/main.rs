@@ -6,6 +6,7 @@ mod device;
 mod flash;
 mod link;
 mod model;
+mod random;
 mod safety;
 mod saved;
 mod settings;

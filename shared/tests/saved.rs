@@ -3,6 +3,7 @@
 use crate::common;
 use crate::flash;
 
+use crate::random::Random;
 use blindgrasp_shared::identity::Restored;
 use blindgrasp_shared::parameter::Text;
 use blindgrasp_shared::parameters::{Parameter, Setting};
@@ -11,7 +12,6 @@ use blindgrasp_shared::store::{Entry, Store, StoreError};
 use blindgrasp_shared::tick::Params;
 use common::{JOINTS, config, params};
 use flash::Memory;
-use flash::random::Random;
 
 const HAND: u32 = 7;
 const FORCE: Parameter = Parameter::gain(0);

@@ -3,6 +3,7 @@
 use crate::common;
 use crate::flash;
 
+use crate::random::Random;
 use blindgrasp_shared::command::{Command, Grasp, Refusal};
 use blindgrasp_shared::device::{Device, Inputs, Outputs};
 use blindgrasp_shared::event::Event;
@@ -18,7 +19,6 @@ use blindgrasp_shared::telemetry::burst::Burst;
 use blindgrasp_shared::tick::Params;
 use common::{COUNTS_PER_RAD, FACING_RAD, JOINTS, config, facing_counts, params};
 use flash::Memory;
-use flash::random::Random;
 
 const HAND: u32 = 7;
 const IMAGE: Image<'_> = Image {

@@ -2,12 +2,12 @@
 
 use crate::flash;
 
+use crate::random::Random;
 use blindgrasp_shared::parameter::Text;
 use blindgrasp_shared::parameters::Parameter;
 use blindgrasp_shared::store::{Entry, MOST_ENTRIES, MOST_WORDS, SLOT_BYTES, Store, StoreError};
 use crc::{CRC_32_ISO_HDLC, Crc};
 use flash::Memory;
-use flash::random::Random;
 use proptest::prelude::*;
 use std::collections::HashSet;
 

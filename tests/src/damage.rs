@@ -5,7 +5,7 @@
 
 #[path = "../../shared/tests/link/line.rs"]
 mod line;
-#[path = "../../shared/tests/link/random.rs"]
+#[path = "../../shared/tests/random.rs"]
 mod random;
 
 use crate::conversation::frame;

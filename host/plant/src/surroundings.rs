@@ -54,7 +54,7 @@ mod tests {
         let mut surroundings = Surroundings::of(&body, &on(4));
         let mut centre = Vector3::new(0.02, 0.014, 0.0);
         for _ in 0..20_000 {
-            let step = numbers.vector() * 10f64.powf(-5.0 + 3.0 * numbers.next());
+            let step = numbers.vector() * 10f64.powf(-5.0 + 3.0 * numbers.unit());
             centre = (centre + step).map(|v| v.clamp(-0.03, 0.035));
             let radius_m = 0.01;
             let expected = body.clearance_m(4, &centre) < radius_m;

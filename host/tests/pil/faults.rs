@@ -1,6 +1,6 @@
 //! Faults in a grasp, with the whole device in the loop: alone, and behind a link with its twin.
 
-use crate::device::{Firmware, PATIENCE, Wrong};
+use super::device::{Firmware, PATIENCE, Wrong};
 use blindgrasp::device::client::Client;
 use blindgrasp::model::Scene;
 use blindgrasp::rig::pil::{Linked, Peer, Pilot, Plan};

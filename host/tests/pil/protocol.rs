@@ -1,6 +1,6 @@
 //! Messages of the link, and the answers to wrong ones.
 
-use crate::device::{Firmware, PATIENCE, Wrong};
+use super::device::{Firmware, PATIENCE, Wrong};
 use blindgrasp::device::client::Client;
 use blindgrasp::model::Scene;
 use blindgrasp::record::compare::Value;

@@ -1,7 +1,7 @@
 //! Files that were cut or changed: no panic, bounded memory, no entry that was not recorded, and every loss told.
 
-use crate::hand::{Hand, about, read, settings};
-use crate::{is_limited, run_limited};
+use super::hand::{Hand, about, read, settings};
+use super::{is_limited, run_limited};
 use blindgrasp::record::mcap::{Entry, Recording, Stamp, What, Writer};
 use std::fs;
 use std::path::Path;

@@ -1,7 +1,7 @@
 //! A disk without room.
 
-use crate::hand::{Hand, about, read};
-use crate::{is_limited, run_limited};
+use super::hand::{Hand, about, read};
+use super::{is_limited, run_limited};
 use blindgrasp::record::mcap::{RecordingError, Stamp, What, Writer};
 use std::path::Path;
 

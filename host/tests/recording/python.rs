@@ -1,6 +1,6 @@
 //! The Python package `mcap` reads the same as we do.
 
-use crate::hand::{Hand, about, read, settings};
+use super::hand::{Hand, about, read, settings};
 use blindgrasp::model::Scene;
 use blindgrasp::record::mcap::{Decoded, Decoder, Stamp, What, Writer};
 use blindgrasp_shared::limit::Limit;
@@ -173,7 +173,7 @@ fn python_reads_the_true_state_of_the_world() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.mcap");
     let scene = Scene::load("cube", &["duration_s=0.3".to_owned()]).unwrap();
-    let samples = crate::simulation::run(&scene, &path);
+    let samples = super::simulation::run(&scene, &path);
     let told = python(&path);
     let truth = |topic: &str| told["truth"][topic].as_array().unwrap();
     let (objects, joints, contacts) =

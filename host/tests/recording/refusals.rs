@@ -1,6 +1,6 @@
 //! Files that are no recording, or none that this program knows.
 
-use crate::hand::{Hand, about};
+use super::hand::{Hand, about};
 use blindgrasp::record::mcap::{Decoder, Recording, RecordingError, Stamp, Writer};
 use blindgrasp_shared::telemetry::INTERFACE_VERSION;
 use mcap::records::{MessageHeader, Metadata};

@@ -1,6 +1,6 @@
 //! Everything that is written comes back.
 
-use crate::hand::{Hand, about, is_derived, read, settings};
+use super::hand::{Hand, about, is_derived, read, settings};
 use blindgrasp::record::mcap::{Arrival, Decoder, Entry, Level, Stamp, What, Writer};
 
 const MS: u64 = 1_000_000;

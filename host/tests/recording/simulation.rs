@@ -1,6 +1,6 @@
 //! A simulation leaves the recording that its hand would, and in it the true state of its world.
 
-use crate::hand::read;
+use super::hand::read;
 use blindgrasp::body::{MAX_FINGERS, MAX_JOINTS};
 use blindgrasp::model::file::ShapeFile;
 use blindgrasp::model::{HandFile, Scene, mesh};

@@ -2,14 +2,11 @@
 
 #![allow(dead_code, reason = "each test file uses its part")]
 
-#[path = "../link/random.rs"]
-pub(crate) mod random;
-
+use super::random::Random;
 use blindgrasp_shared::store::SLOT_BYTES;
 use embedded_storage::nor_flash::{
     ErrorType, NorFlash, NorFlashErrorKind, ReadNorFlash, check_erase, check_read, check_write,
 };
-use random::Random;
 
 /// NOR flash of two sectors, as microcontrollers have it: bits are erased to ones, a sector at a time,
 /// and programmed to zeros, a word at a time; a word is programmed once, or once more to zero.

@@ -1,8 +1,8 @@
 //! A million damaged frames: none is accepted, and each costs no more than it must.
 
-use crate::line::Damage;
-use crate::property::{CAPACITY, frame, receive};
-use crate::random::Random;
+use super::line::Damage;
+use super::property::{CAPACITY, frame, receive};
+use super::random::Random;
 use blindgrasp_shared::link::{Counters, FrameError, Receiver};
 
 const FRAMES: usize = if cfg!(debug_assertions) { 20_000 } else { 1_000_000 };

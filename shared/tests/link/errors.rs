@@ -1,7 +1,7 @@
 //! The promises of the CRC, by exhaustion: errors of few bits, and bursts.
 
-use crate::property::{CAPACITY, checksum, crc32, frame, receive, stuff, unstuff, with_crc};
-use crate::random::Random;
+use super::property::{CAPACITY, checksum, crc32, frame, receive, stuff, unstuff, with_crc};
+use super::random::Random;
 use blindgrasp_shared::link::{FrameError, Receiver};
 use std::collections::HashSet;
 

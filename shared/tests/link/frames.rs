@@ -1,6 +1,6 @@
 //! Frames that nothing happened to, and bytes that are hard for COBS.
 
-use crate::property::{self, CAPACITY, LONGEST, Raw, frame, receive, stuff, with_crc};
+use super::property::{self, CAPACITY, LONGEST, Raw, frame, receive, stuff, with_crc};
 use blindgrasp_shared::bytes::BufferTooSmall;
 use blindgrasp_shared::link::{self, Counters, FrameError, Receiver};
 use proptest::prelude::*;

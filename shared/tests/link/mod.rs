@@ -5,5 +5,6 @@ mod errors;
 mod frames;
 mod line;
 mod property;
-mod random;
 mod rate;
+
+use crate::random;

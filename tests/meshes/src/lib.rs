@@ -10,20 +10,20 @@ pub type Mesh = (Vec<Vector3<f64>>, Vec<[usize; 3]>);
 pub struct Numbers(pub u64);
 
 impl Numbers {
-    /// The next one.
-    pub fn next(&mut self) -> f64 {
+    /// The next one, in [0, 1).
+    pub fn unit(&mut self) -> f64 {
         self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
         (self.0 >> 11) as f64 / (1u64 << 53) as f64
     }
 
     /// A whole number below `count`.
     pub fn below(&mut self, count: usize) -> usize {
-        (self.next() * count as f64) as usize
+        (self.unit() * count as f64) as usize
     }
 
     /// In the cube from -1 to 1.
     pub fn vector(&mut self) -> Vector3<f64> {
-        Vector3::from_fn(|_, _| 2.0 * self.next() - 1.0)
+        Vector3::from_fn(|_, _| 2.0 * self.unit() - 1.0)
     }
 
     /// A rotation about any axis.

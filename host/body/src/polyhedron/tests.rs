@@ -205,13 +205,13 @@ fn random_points_with_near_coincidences_never_panic() {
     let mut numbers = Numbers(4);
     let (mut made, mut refused) = (0, 0);
     for _ in 0..500 {
-        let count = 4 + (numbers.next() * 10.0) as usize;
+        let count = 4 + (numbers.unit() * 10.0) as usize;
         let mut points: Vec<_> = (0..count).map(|_| numbers.vector()).collect();
         for k in 0..count {
             // Snap some onto others' planes, with an error of every size.
-            if numbers.next() < 0.5 {
-                let noise = 10f64.powi(-(numbers.next() * 18.0) as i32) * numbers.next();
-                points[k].z = if numbers.next() < 0.5 { 1.0 + noise } else { -1.0 - noise };
+            if numbers.unit() < 0.5 {
+                let noise = 10f64.powi(-(numbers.unit() * 18.0) as i32) * numbers.unit();
+                points[k].z = if numbers.unit() < 0.5 { 1.0 + noise } else { -1.0 - noise };
             }
         }
         match Polyhedron::hull(&points) {

@@ -63,7 +63,7 @@ fn the_nearest_point_of_a_triangle_is_the_nearest() {
         let mut corners = [numbers.vector(), numbers.vector(), numbers.vector()];
         if round % 10 == 0 {
             // A needle, and a point.
-            corners[2] = corners[0] + (corners[1] - corners[0]) * numbers.next();
+            corners[2] = corners[0] + (corners[1] - corners[0]) * numbers.unit();
         }
         if round % 100 == 0 {
             corners = [corners[0]; 3];

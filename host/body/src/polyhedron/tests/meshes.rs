@@ -236,10 +236,10 @@ fn faces_and_outlines_fit_together_under_any_noise() {
     let mut numbers = Numbers(8);
     let samples = [grid_box([0.05, 0.04, 0.03], 6), bracket(), plate(), icosphere(0.03, 3)];
     for round in 0..120 {
-        let noise = 10f64.powf(-6.0 + 4.0 * numbers.next());
+        let noise = 10f64.powf(-6.0 + 4.0 * numbers.unit());
         let mesh = with_noise(samples[round % 4].clone(), noise, round as u64);
         let flatness =
-            Flatness { angle_rad: 0.3 * numbers.next().powi(3), distance_m: 1e-3 * numbers.next().powi(3) };
+            Flatness { angle_rad: 0.3 * numbers.unit().powi(3), distance_m: 1e-3 * numbers.unit().powi(3) };
         let Ok(body) = Polyhedron::mesh(&mesh.0, &mesh.1, &flatness) else { continue };
         assert_eq!(body.faces.iter().map(|face| face.triangles.len()).sum::<usize>(), mesh.1.len());
         let mut edges: Vec<(usize, usize)> = body.faces.iter().flat_map(Face::edges).collect();

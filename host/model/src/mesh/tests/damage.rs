@@ -31,7 +31,7 @@ fn damaged_files_never_panic() {
                     let to = numbers.below(bytes.len());
                     bytes.splice(to..to, copy);
                 }
-                5 => bytes.insert(at, (numbers.next() * 256.0) as u8),
+                5 => bytes.insert(at, (numbers.unit() * 256.0) as u8),
                 _ => {
                     let other = numbers.below(bytes.len().min(200));
                     bytes.swap(at, other);

@@ -53,7 +53,7 @@ fn polygons_are_cut_without_gaps_or_overlaps() {
     let mut numbers = blindgrasp_meshes::Numbers(40);
     for _ in 0..500 {
         let count = 3 + numbers.below(40);
-        let mut angles: Vec<f64> = (0..count).map(|_| numbers.next() * std::f64::consts::TAU).collect();
+        let mut angles: Vec<f64> = (0..count).map(|_| numbers.unit() * std::f64::consts::TAU).collect();
         angles.sort_by(f64::total_cmp);
         if angles.windows(2).any(|pair| pair[1] - pair[0] < 1e-3 || pair[1] - pair[0] > 3.0)
             || angles[0] + std::f64::consts::TAU - angles[count - 1] > 3.0
@@ -65,7 +65,7 @@ fn polygons_are_cut_without_gaps_or_overlaps() {
             .iter()
             .map(|angle| {
                 let (sine, cosine) = blindgrasp_shared::math::Real::sine_cosine(*angle);
-                Vector3::new(cosine, sine, 0.0) * (0.2 + numbers.next())
+                Vector3::new(cosine, sine, 0.0) * (0.2 + numbers.unit())
             })
             .collect();
         let corners: Vec<Vector3<f64>> = flat.iter().map(|p| turn * p).collect();
