@@ -3,6 +3,7 @@
 
 pub use blindgrasp_body as body;
 pub use blindgrasp_device as device;
+pub use blindgrasp_files as files;
 pub use blindgrasp_model as model;
 #[cfg(feature = "monitor")]
 pub use blindgrasp_monitor as monitor;

@@ -1,9 +1,10 @@
 //! The command `blindgrasp`. Results go to stdout, progress and errors to stderr.
 
+#[macro_use]
+mod terminal;
 mod commands;
 
 use clap::{Parser, Subcommand};
-use std::io::{self, Write as _};
 use std::process::ExitCode;
 
 /// Blind grasping of polyhedral objects with a multi-fingered, torque-controlled hand
@@ -30,11 +31,15 @@ enum Command {
     #[cfg(unix)]
     Serve(commands::serve::Arguments),
     Replay(commands::replay::Arguments),
+    Recording(commands::recording::Arguments),
     Export(commands::export::Arguments),
 }
 
 fn main() -> ExitCode {
-    let outcome = match Cli::parse().command {
+    let command = Cli::parse().command;
+    blindgrasp::files::protect_inputs();
+    blindgrasp::device::interrupt::tidy_up();
+    let outcome = match command {
         Command::Sim(arguments) => commands::sim::run(&arguments),
         Command::Sweep(arguments) => commands::sweep::run(&arguments),
         Command::Hand(arguments) => commands::hand::run(&arguments),
@@ -49,14 +54,14 @@ fn main() -> ExitCode {
         #[cfg(unix)]
         Command::Serve(arguments) => commands::serve::run(&arguments),
         Command::Replay(arguments) => commands::replay::run(&arguments),
+        Command::Recording(arguments) => commands::recording::run(&arguments),
         Command::Export(arguments) => commands::export::run(&arguments),
     };
     match outcome {
         Ok(commands::Outcome::Shown) => ExitCode::SUCCESS,
         Ok(commands::Outcome::Failed) => ExitCode::from(1),
         Err(error) => {
-            // A terminal may be gone: nobody to tell, and no reason to panic.
-            let _ = writeln!(io::stderr(), "blindgrasp: {}", commands::in_a_line(&error));
+            eprintln!("blindgrasp: {}", commands::in_a_line(&error));
             ExitCode::from(2)
         }
     }

@@ -202,19 +202,38 @@ fn what_can_not_be_written_is_said_after_the_summary() {
     assert!(error.contains(&blocked) && error.lines().count() == 1, "{error}");
 }
 
-#[cfg(target_os = "linux")]
+#[cfg(unix)]
 #[test]
-fn a_full_disk_is_said_after_the_summary() {
+fn a_full_disk_is_said_after_the_summary_and_what_was_there_stays() {
     let folder = Folder::new("full");
     fs::create_dir(folder.path("run")).expect("a directory");
-    // Every byte that is written to this device fails as on a full disk.
-    std::os::unix::fs::symlink("/dev/full", folder.path("run/trace.csv")).expect("a link");
-    let out = folder.path("run");
-    let output = blindgrasp(&["sim", "prism", "--duration", "0.05", "--out", &out, "--force"]);
+    folder.write("run/trace.csv", "an old one");
+    // No file may be longer than 4 KiB; a write beyond that is an error, and no signal.
+    let output = Command::new("sh")
+        .args(["-c", "trap '' XFSZ; ulimit -f 8; exec \"$@\"", "sh", env!("CARGO_BIN_EXE_blindgrasp")])
+        .args(["sim", "prism", "--duration", "0.05", "--force", "--out", &folder.path("run")])
+        .output()
+        .expect("the command starts");
     assert_eq!(output.status.code(), Some(2));
     assert!(text(&output.stdout).contains("prism"), "the summary is printed all the same");
     let error = text(&output.stderr);
-    assert!(error.contains("trace.csv") && error.contains("No space left"), "{error}");
+    assert!(error.contains("File too large") && error.contains("nothing is written"), "{error}");
+    assert_eq!(fs::read_to_string(folder.path("run/trace.csv")).expect("a file"), "an old one");
+    assert_eq!(fs::read_dir(folder.path("")).expect("a folder").count(), 1);
+}
+
+/// What is no file is not taken for one that may be replaced.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_device_in_a_folder_is_not_replaced() {
+    let folder = Folder::new("device");
+    fs::create_dir(folder.path("run")).expect("a directory");
+    std::os::unix::fs::symlink("/dev/null", folder.path("run/trace.csv")).expect("a link");
+    let output = blindgrasp(&["sim", "prism", "--duration", "0.05", "--force", "--out", &folder.path("run")]);
+    let error = text(&output.stderr);
+    assert!(error.contains("trace.csv: it is a device or a socket, not a file"), "{error}");
+    assert_eq!(output.status.code(), Some(2));
+    assert_eq!(fs::read_dir(folder.path("run")).expect("a folder").count(), 1);
 }
 
 #[test]
@@ -360,7 +379,7 @@ fn objects_are_checked_and_made_from_meshes() {
     );
     let output = blindgrasp(&["object", "new", &mesh, "--unit", "mm", "--mass-kg", "1"]);
     assert_eq!(output.status.code(), Some(2));
-    assert!(text(&output.stderr).contains("part.toml: is there already; name another with --out"));
+    assert!(text(&output.stderr).contains("part.toml: is there already; choose another with --out"));
     let output = blindgrasp(&["object", "check", &made, "--json"]);
     let check: Value = serde_json::from_slice(&output.stdout).expect("JSON");
     assert_eq!(check["verdict"], "good");

@@ -280,3 +280,67 @@ fn an_hour() {
     assert_eq!(session.arrived, 3_600_001);
     println!("{:?}", session.finish());
 }
+
+/// What is lost while a link is cut is counted by the numbers that go on behind it; where the device has started anew, from its
+/// start. Rows tell their session, and the host's time never runs back.
+#[test]
+fn what_is_lost_across_cuts_is_counted_and_rows_tell_their_session() {
+    let (folder, path) = folder();
+    let mut session = Session::new(&path);
+    let lose = |session: &mut Session, ticks: u32| {
+        for _ in 0..ticks {
+            session.turn(None, Fate::IsLost);
+        }
+    };
+    let begin = |session: &mut Session| {
+        session.hello();
+        session.telemetry(1, Signals::FULL);
+        session.run(700);
+    };
+    begin(&mut session);
+    // A cable is cut for 5 s, of which the host notices a part only.
+    lose(&mut session, 700);
+    session.cut();
+    lose(&mut session, 4300);
+    begin(&mut session);
+    // The same once more, twice in a row, and longer than the device had been there.
+    session.cut();
+    lose(&mut session, 900);
+    session.cut();
+    lose(&mut session, 30_000);
+    begin(&mut session);
+    assert_eq!(session.sent - session.arrived, 35_900);
+    // It starts anew: before anybody asks there are no records, and then some are lost.
+    session.restart(2000);
+    session.hello();
+    session.telemetry(1, Signals::FULL);
+    lose(&mut session, 40);
+    session.run(700);
+    // Again, but for longer than it has counted before.
+    session.restart(6000);
+    begin(&mut session);
+    let (sent, arrived) = (session.sent, session.arrived);
+    assert_eq!(sent - arrived, 35_940);
+    session.finish();
+
+    let output = command(&path, &["--to", "csv"]);
+    assert_eq!(output.status.code(), Some(0), "{}", told(&output));
+    let words = format!("{arrived} rows; 35940 records lost, 5 gaps");
+    assert!(told(&output).contains(&words), "{}", told(&output));
+    let (header, rows) = csv_rows(&std::fs::read(folder.path().join("recording.csv")).unwrap());
+    let at = |name: &str| header.iter().position(|column| column == name).unwrap();
+    let lost: Vec<u64> = rows.iter().map(|row| row[at("lost_before")].parse().unwrap()).collect();
+    assert_eq!(lost.iter().filter(|lost| **lost > 0).copied().collect::<Vec<_>>(), [5000, 30_900, 40]);
+    let column =
+        |name: &str| rows.iter().map(|row| row[at(name)].parse::<f64>().unwrap()).collect::<Vec<_>>();
+    let (sessions, host_s) = (column("session"), column("host_time_s"));
+    let in_turn = |values: &[f64]| values.windows(2).all(|pair| pair[0] <= pair[1]);
+    assert!(in_turn(&sessions) && in_turn(&host_s));
+    for number in 1..=5 {
+        let count = sessions.iter().filter(|session| **session == f64::from(number)).count();
+        assert!((690..=710).contains(&count), "session {number}: {count} rows");
+    }
+    // A session's records are where they were: 5 s are 5 s.
+    let first = |number: f64| host_s[sessions.iter().position(|session| *session == number).unwrap()];
+    assert!((first(2.0) - 5.7).abs() < 0.01, "{}", first(2.0));
+}

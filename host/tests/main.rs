@@ -9,6 +9,8 @@ mod console;
 mod elf;
 #[cfg(feature = "parquet")]
 mod export;
+#[cfg(all(unix, feature = "parquet", feature = "sweep"))]
+mod files;
 mod flash;
 mod hand;
 mod hand_check;

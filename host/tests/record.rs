@@ -18,8 +18,11 @@ use nix::unistd::Pid;
 use serde_json::Value;
 use std::fs;
 use std::io::{BufRead as _, BufReader, Read as _, Write as _};
+use std::os::unix::net::{UnixListener, UnixStream};
 use std::path::{Path, PathBuf};
 use std::process::{Child, ChildStdin, Command, Stdio};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex};
 use std::thread;
 use std::time::{Duration, Instant};
 use tempfile::TempDir;
@@ -260,6 +263,9 @@ fn read(path: &Path) -> Vec<Content> {
         content.records.extend(decoder.take(&entry));
     }
     let damaged = !entries.damage().is_none();
+    if damaged {
+        println!("{}", entries.damage());
+    }
     contents.iter_mut().for_each(|content| content.damaged = damaged);
     contents
 }
@@ -500,6 +506,106 @@ fn a_hand_that_is_cut_off_is_waited_for_and_another_loses_nothing() {
     assert!(resumed_ms < 3000.0, "{resumed_ms} ms");
 }
 
+/// A cable between a served hand and a socket, which can be cut: the hand does not notice.
+struct Cable {
+    listening: Arc<AtomicBool>,
+    _threads: Vec<thread::JoinHandle<()>>,
+}
+
+impl Cable {
+    fn lay(link: &Path, socket: PathBuf) -> Self {
+        let listening = Arc::new(AtomicBool::new(true));
+        let mut port = fs::OpenOptions::new().read(true).write(true).open(link).expect("the hand's port");
+        let mut reading = port.try_clone().expect("a second handle");
+        let plugged: Arc<Mutex<Option<UnixStream>>> = Arc::default();
+        let (out, to) = (Arc::clone(&plugged), Arc::clone(&listening));
+        let from_hand = thread::spawn(move || {
+            let mut buffer = [0; 4096];
+            while let Ok(count @ 1..) = reading.read(&mut buffer) {
+                // What nobody is there for is gone, as on a wire.
+                let mut plugged = out.lock().expect("a lock");
+                if let Some(stream) = plugged.as_mut().filter(|_| to.load(Ordering::Relaxed)) {
+                    let _ = stream.write_all(&buffer[..count]);
+                }
+            }
+        });
+        let is_plugged = Arc::clone(&listening);
+        let to_hand = thread::spawn(move || {
+            loop {
+                while !is_plugged.load(Ordering::Relaxed) {
+                    thread::sleep(Duration::from_millis(5));
+                }
+                let _ = fs::remove_file(&socket);
+                let Ok(listener) = UnixListener::bind(&socket) else { return };
+                let Ok((mut stream, _)) = listener.accept() else { return };
+                drop(listener);
+                let _ = fs::remove_file(&socket);
+                stream.set_read_timeout(Some(Duration::from_millis(20))).expect("a timeout");
+                *plugged.lock().expect("a lock") = stream.try_clone().ok();
+                let mut buffer = [0; 4096];
+                while is_plugged.load(Ordering::Relaxed) {
+                    match stream.read(&mut buffer) {
+                        Ok(0) => break,
+                        Ok(count) => port.write_all(&buffer[..count]).expect("the hand takes it"),
+                        Err(_) => {}
+                    }
+                }
+                *plugged.lock().expect("a lock") = None;
+            }
+        });
+        Self { listening, _threads: vec![from_hand, to_hand] }
+    }
+
+    fn plug(&self, plugged: bool) {
+        self.listening.store(plugged, Ordering::Relaxed);
+    }
+}
+
+/// A cable that is cut for 3 s: every record that the hand sent meanwhile is counted as lost, in the summary, the file and the
+/// table, and the time is that from the last record before to the first one after.
+#[test]
+fn what_is_lost_while_a_cable_is_cut_is_counted_and_so_is_the_time() {
+    let folder = TempDir::new().expect("a folder");
+    let (link, socket) = (folder.path().join("hand"), folder.path().join("socket"));
+    let out = folder.path().join("cut.mcap");
+    let _hand = serve(&link, &[]);
+    let cable = Cable::lay(&link, socket.clone());
+    let begun = Instant::now();
+    while !socket.exists() {
+        assert!(begun.elapsed() < PATIENCE);
+        thread::sleep(Duration::from_millis(5));
+    }
+    let port = format!("unix:{}", socket.display());
+    let mut record = Process::start(recorded(&out, &[Path::new(&port)], &["--duration", "12"]));
+    thread::sleep(Duration::from_secs(3));
+    cable.plug(false);
+    thread::sleep(Duration::from_secs(3));
+    cable.plug(true);
+    let (code, said, errors) = record.end(PATIENCE);
+    assert_eq!(code, Some(1), "{said}\n{errors}");
+    let report: Value = serde_json::from_str(&said).expect("JSON");
+    let device = &report["devices"][0];
+    assert_eq!((&device["gaps"], &device["sessions"]), (&1.into(), &2.into()), "{said}\n{errors}");
+    let [content] = &read(&out)[..] else { panic!("one device") };
+    let numbers: Vec<u32> = content.records.iter().map(|decoded| decoded.record.sequence).collect();
+    let between: u64 = numbers.windows(2).map(|pair| u64::from(pair[1] - pair[0] - 1)).sum();
+    let told: u64 = content.records[1..].iter().map(|decoded| decoded.lost_before).sum();
+    let missing = device["missing"].as_u64().expect("a number");
+    assert!(between > 2500, "{between}");
+    assert_eq!((missing, told), (between, between), "{said}");
+    let silent_s = content
+        .records
+        .windows(2)
+        .map(|pair| (pair[1].arrived.0 - pair[0].arrived.0) as f64 * 1e-9)
+        .fold(0.0, f64::max);
+    let told_s = device["gaps_s"].as_f64().expect("a number");
+    println!("cut for 3 s: {missing} records missing, {told_s:.3} s told, {silent_s:.3} s in the file");
+    assert!(told_s > 2.9 && (told_s - silent_s).abs() < 0.1, "{told_s} s and {silent_s} s: {said}");
+    let path = out.to_str().expect("UTF-8");
+    let (_, _, errors) = Process::start(blindgrasp(&["export", path, "--to", "csv"])).end(PATIENCE);
+    assert!(errors.contains(&format!("{missing} records lost, 1 gaps")), "{errors}");
+}
+
 /// Kills a recording after this time, and looks at what is left: the time of which nothing was saved, s.
 fn killed(folder: &Path, link: &Path, number: usize, after: Duration) -> f64 {
     let out = folder.join(format!("killed-{number}.mcap"));
@@ -657,6 +763,14 @@ fn misuse_is_told() {
     // No longer patience than the recording was to be long.
     refused(&["record", "--out", path, "--port", &port, "--duration", "0.3"], &["nothing answers within 0."]);
     assert!(!out.exists(), "a file without anything in it");
+
+    // A gain beyond the hand's own file: told once, with what to do.
+    let (_, _, errors) =
+        Process::start(blindgrasp(&["serve", "cube", "--set", "control.force_n=100"])).end(PATIENCE);
+    assert!(
+        errors.contains("`firmest_factor`") && errors.matches("has to be at most").count() == 1,
+        "{errors}"
+    );
 
     // A file is not overwritten.
     let link: PathBuf = folder.path().join("hand");

@@ -7,6 +7,7 @@
 use super::image::Firmware;
 use super::interrupt;
 use super::transport::{Streams, Transport, TransportError};
+use blindgrasp_files as files;
 use nix::fcntl::OFlag;
 use nix::sys::signal::{Signal, killpg};
 use nix::sys::stat::Mode;
@@ -105,7 +106,7 @@ impl Qemu {
     /// If the file is no such image.
     pub fn new(image: &Path, patience: Duration) -> Result<Self, QemuError> {
         let fail = |reason: String| Err(QemuError::Image { path: image.to_owned(), reason });
-        let bytes = match fs::read(image) {
+        let bytes = match files::read(image) {
             Ok(bytes) => bytes,
             Err(error) => return fail(error.to_string()),
         };

@@ -99,6 +99,8 @@ impl Recording {
             changed: None,
             burst: None,
             status_due: None,
+            heard: None,
+            silent_since: None,
             totals: Arc::default(),
         };
         recorder.send(Box::new(move |writer| {
@@ -113,7 +115,8 @@ impl Recording {
         lock(&self.told).saved
     }
 
-    /// Ends the file, once everything is written that recorders have given. They can add nothing any more.
+    /// Ends the file, once everything is written that recorders have given. They can add nothing any more. If nobody had a session,
+    /// there is no file.
     ///
     /// # Errors
     /// If that can't be written.
@@ -121,6 +124,7 @@ impl Recording {
         let Some(Writing { entries, thread }) = lock(&self.thread).take() else { return Ok(self.saved()) };
         let _ = entries.send(None);
         match thread.join() {
+            Ok(writer) if writer.is_empty() => Ok(Saved::default()),
             Ok(writer) => writer.finish(),
             Err(_) => Ok(self.saved()),
         }
@@ -171,8 +175,10 @@ pub struct Totals {
     pub unusable: u64,
     /// Damaged frames.
     pub damaged: u64,
-    /// Times that the link was cut.
+    /// Times that the link was cut, and for how long in all: from what came last to the first record after.
     pub gaps: u64,
+    /// See [`Self::gaps`].
+    pub gaps_time: Duration,
     /// Largest number of ticks from one record to the next.
     pub decimation: u32,
 }
@@ -237,6 +243,9 @@ pub struct Recorder {
     changed: Option<Instant>,
     burst: Option<Burst>,
     status_due: Option<Instant>,
+    /// The time at which something came last, and since which nothing does.
+    heard: Option<Instant>,
+    silent_since: Option<Instant>,
     totals: Arc<Mutex<Totals>>,
 }
 
@@ -267,6 +276,7 @@ impl Recorder {
         match event {
             Event::Received(payload) if is_identity(payload) => payload.clone_into(&mut self.identity),
             Event::Received(payload) if self.phase != Phase::Nobody => {
+                self.heard = Some(now);
                 let payload = payload.clone();
                 self.write(now, move |writer, device, at| writer.received(device, at, &payload).map(|_| ()))?;
             }
@@ -290,6 +300,7 @@ impl Recorder {
                     })?;
                 }
             }
+            Event::Record(_) if self.phase != Phase::Nobody => self.end_silence(now),
             Event::StartedAnew => self.cut("the device was reset", now)?,
             Event::Aside(request, answer) => self.answered(request, answer.as_ref(), talk, now)?,
             Event::Answer(Request::SetParameter { parameter, index, value }, Answer::Done) => {
@@ -345,9 +356,21 @@ impl Recorder {
         (self.changed, self.burst, self.status_due) = (None, None, None);
         self.kept.clear();
         lock(&self.totals).gaps += 1;
+        self.silent_since = Some(self.heard.unwrap_or(now));
         self.status(now)?;
         let words = words.to_owned();
         self.write(now, move |writer, device, at| writer.gap(device, at, &words))
+    }
+
+    /// For how long nothing has come, where the link was cut.
+    pub fn silence(&self, now: Instant) -> Option<Duration> {
+        self.silent_since.map(|since| now - since)
+    }
+
+    fn end_silence(&mut self, now: Instant) {
+        if let Some(since) = self.silent_since.take() {
+            lock(&self.totals).gaps_time += now - since;
+        }
     }
 
     /// The last status of the link. Waits until all of it is written, and returns what became of the records.
@@ -355,6 +378,7 @@ impl Recorder {
     /// # Errors
     /// The recording has stopped.
     pub fn finish(&mut self, now: Instant) -> Result<Totals, RecordingError> {
+        self.end_silence(now);
         if self.phase != Phase::Nobody {
             self.status(now)?;
             self.phase = Phase::Nobody;

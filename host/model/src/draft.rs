@@ -5,6 +5,7 @@ use super::error::{Notice, SceneError};
 use super::library::{self, Document, Kind};
 use super::tree::{Node, Setting};
 use super::{Place, Scene, SceneFile, build, read};
+use std::ffi::OsStr;
 use std::path::Path;
 
 /// A scene before its settings.
@@ -21,9 +22,9 @@ impl Draft {
     ///
     /// # Errors
     /// One line: where, which key, what is wrong, what to do.
-    pub fn open(name_or_path: &str, settings: &[Setting]) -> Result<Self, SceneError> {
-        let document = Document::open(Kind::Scene, name_or_path, Path::new(""))
-            .map_err(|error| error.at(&Place::whole(name_or_path)))?;
+    pub fn open(name_or_path: impl AsRef<OsStr>, settings: &[Setting]) -> Result<Self, SceneError> {
+        let document = Document::open(Kind::Scene, name_or_path.as_ref(), Path::new(""))
+            .map_err(|error| error.at(&Place::of_path(name_or_path.as_ref())))?;
         Self::of(document, settings)
     }
 

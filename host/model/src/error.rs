@@ -1,5 +1,6 @@
 //! One line that says where, which key, what is wrong, and what to do.
 
+use std::ffi::OsStr;
 use std::{fmt, sync::Arc};
 
 /// Longer messages are cut, bytes.
@@ -20,6 +21,11 @@ impl Place {
     /// A place without a line.
     pub fn whole(source: &str) -> Self {
         Self { source: source.into(), line: 0 }
+    }
+
+    /// A file, without a line.
+    pub(super) fn of_path(path: &OsStr) -> Self {
+        Self::whole(&path.to_string_lossy())
     }
 
     /// Returns `true` if it is in a file, and not on the command line.

@@ -13,6 +13,7 @@ use super::{
 use blindgrasp_body::{Hand, MAX_JOINTS};
 use blindgrasp_shared::model;
 use blindgrasp_shared::tick::{Config, Params};
+use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 
 /// Bytes that the largest hand and its configuration take: 250 a joint are more than enough.
@@ -42,7 +43,7 @@ impl HandModel {
     ///
     /// # Errors
     /// One line: where, which key, what is wrong, what to do.
-    pub fn load(name_or_path: &str) -> std::result::Result<Self, SceneError> {
+    pub fn load(name_or_path: impl AsRef<OsStr>) -> std::result::Result<Self, SceneError> {
         Self::load_with_file(name_or_path).map(|(model, _)| model)
     }
 
@@ -50,9 +51,11 @@ impl HandModel {
     ///
     /// # Errors
     /// As [`Self::load`].
-    pub fn load_with_file(name_or_path: &str) -> std::result::Result<(Self, HandFile), SceneError> {
-        let whole = Place::whole(name_or_path);
-        let document = Document::open(Kind::Hand, name_or_path, Path::new(""));
+    pub fn load_with_file(
+        name_or_path: impl AsRef<OsStr>,
+    ) -> std::result::Result<(Self, HandFile), SceneError> {
+        let whole = Place::of_path(name_or_path.as_ref());
+        let document = Document::open(Kind::Hand, name_or_path.as_ref(), Path::new(""));
         Self::from_document(document.map_err(|error| error.at(&whole))?)
     }
 
@@ -88,7 +91,8 @@ impl HandModel {
 
     /// The files on the disk that a hand is read from: its own, and its URDF. As far as they can be told; none for a hand
     /// built in.
-    pub fn files(name_or_path: &str) -> Vec<PathBuf> {
+    pub fn files(name_or_path: impl AsRef<OsStr>) -> Vec<PathBuf> {
+        let name_or_path = name_or_path.as_ref();
         if !is_path(name_or_path) {
             return Vec::new();
         }
@@ -167,9 +171,11 @@ impl HandFile {
     ///
     /// # Errors
     /// One line: where, which key, what is wrong, what to do.
-    pub fn load_checked(name_or_path: &str) -> std::result::Result<(Self, Hand, Vec<String>), SceneError> {
-        let document = Document::open(Kind::Hand, name_or_path, Path::new(""));
-        let document = document.map_err(|error| error.at(&Place::whole(name_or_path)))?;
+    pub fn load_checked(
+        name_or_path: impl AsRef<OsStr>,
+    ) -> std::result::Result<(Self, Hand, Vec<String>), SceneError> {
+        let document = Document::open(Kind::Hand, name_or_path.as_ref(), Path::new(""));
+        let document = document.map_err(|error| error.at(&Place::of_path(name_or_path.as_ref())))?;
         let mut warnings = Vec::new();
         let (file, hand, notices) = checked(document, |file| file.prepare(&mut warnings))?;
         warnings.splice(0..0, notices.iter().map(Notice::to_string));

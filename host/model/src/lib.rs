@@ -39,6 +39,7 @@ use blindgrasp_shared::tick::Config;
 use controller::Setup;
 use library::{Document, Kind};
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
+use std::ffi::OsStr;
 use std::path::Path;
 use tree::Node;
 
@@ -172,9 +173,9 @@ impl Scene {
     ///
     /// # Errors
     /// One line: where, which key, what is wrong, what to do.
-    pub fn load(name_or_path: &str, settings: &[String]) -> Result<Self, SceneError> {
-        let document = Document::open(Kind::Scene, name_or_path, Path::new(""))
-            .map_err(|error| error.at(&Place::whole(name_or_path)))?;
+    pub fn load(name_or_path: impl AsRef<OsStr>, settings: &[String]) -> Result<Self, SceneError> {
+        let document = Document::open(Kind::Scene, name_or_path.as_ref(), Path::new(""))
+            .map_err(|error| error.at(&Place::of_path(name_or_path.as_ref())))?;
         Self::from_document(document, settings)
     }
 
@@ -242,13 +243,13 @@ impl HandFile {
     ///
     /// # Errors
     /// What is wrong with the file as a file; a [`Scene`] checks the numbers.
-    pub fn load(name_or_path: &str) -> Result<Self, SceneError> {
+    pub fn load(name_or_path: impl AsRef<OsStr>) -> Result<Self, SceneError> {
         Self::load_with_places(name_or_path).map(|(file, _)| file)
     }
 
     /// The same, with where its values come from.
-    pub(crate) fn load_with_places(name_or_path: &str) -> Result<(Self, Places), SceneError> {
-        Self::from_document(open(Kind::Hand, name_or_path)?)
+    pub(crate) fn load_with_places(name_or_path: impl AsRef<OsStr>) -> Result<(Self, Places), SceneError> {
+        Self::from_document(open(Kind::Hand, name_or_path.as_ref())?)
     }
 
     /// Reads a hand from a text; `source` is its name in places.
@@ -283,7 +284,7 @@ impl ObjectFile {
     ///
     /// # Errors
     /// What is wrong with the file as a file; a [`Scene`] checks the numbers.
-    pub fn load(name_or_path: &str) -> Result<Self, SceneError> {
+    pub fn load(name_or_path: impl AsRef<OsStr>) -> Result<Self, SceneError> {
         Self::load_with_notices(name_or_path).map(|(file, _)| file)
     }
 
@@ -299,7 +300,7 @@ impl ObjectFile {
     ///
     /// # Errors
     /// As [`Self::load`].
-    pub fn load_with_notices(name_or_path: &str) -> Result<(Self, Vec<Notice>), SceneError> {
+    pub fn load_with_notices(name_or_path: impl AsRef<OsStr>) -> Result<(Self, Vec<Notice>), SceneError> {
         Self::load_with_places(name_or_path).map(|(file, places)| (file, places.notices))
     }
 
@@ -307,7 +308,7 @@ impl ObjectFile {
     ///
     /// # Errors
     /// One line: where, which key, what is wrong, what to do.
-    pub fn load_checked(name_or_path: &str) -> Result<(Self, Vec<String>), SceneError> {
+    pub fn load_checked(name_or_path: impl AsRef<OsStr>) -> Result<(Self, Vec<String>), SceneError> {
         let (file, places) = Self::load_with_places(name_or_path)?;
         let mut warnings: Vec<String> = places.notices.iter().map(Notice::to_string).collect();
         file.body(&mut warnings).map_err(|error| {
@@ -318,13 +319,13 @@ impl ObjectFile {
     }
 
     /// The same, with where its values come from.
-    pub(crate) fn load_with_places(name_or_path: &str) -> Result<(Self, Places), SceneError> {
+    pub(crate) fn load_with_places(name_or_path: impl AsRef<OsStr>) -> Result<(Self, Places), SceneError> {
         let mut notices = Vec::new();
-        let tree = open(Kind::Object, name_or_path)?.complete_object(&mut notices)?;
+        let tree = open(Kind::Object, name_or_path.as_ref())?.complete_object(&mut notices)?;
         Ok((read::read(&tree, "")?, Places { tree, notices }))
     }
 }
 
-fn open(kind: Kind, name_or_path: &str) -> Result<Document, SceneError> {
-    Document::open(kind, name_or_path, Path::new("")).map_err(|error| error.at(&Place::whole(name_or_path)))
+fn open(kind: Kind, name_or_path: &OsStr) -> Result<Document, SceneError> {
+    Document::open(kind, name_or_path, Path::new("")).map_err(|error| error.at(&Place::of_path(name_or_path)))
 }

@@ -6,7 +6,10 @@ use super::{
     tree::{Node, Setting, Value},
     urdf,
 };
+use blindgrasp_files as files;
 use std::borrow::Cow;
+use std::ffi::OsStr;
+use std::io::Read as _;
 use std::path::{Path, PathBuf};
 
 /// No file of ours comes close; something else was named by mistake.
@@ -123,14 +126,14 @@ impl Home {
                 None => Err(SceneError::new("", "is not built in", "name it by its path")),
             };
         }
-        let path = self.resolve(file, named_at);
+        let path = self.resolve(file.as_ref(), named_at);
         Ok((read_text(&path, ".urdf")?.into(), path.to_string_lossy().into_owned()))
     }
 
     /// The bytes of the mesh file that an object names.
     pub(super) fn mesh(
         &self,
-        file: &str,
+        file: &OsStr,
         named_at: &Place,
         largest: u64,
     ) -> Result<Cow<'static, [u8]>, SceneError> {
@@ -144,7 +147,7 @@ impl Home {
     }
 
     /// The path of a file that is named somewhere.
-    fn resolve(&self, file: &str, named_at: &Place) -> PathBuf {
+    fn resolve(&self, file: &OsStr, named_at: &Place) -> PathBuf {
         if named_at.is_in_a_file() { self.folder().join(file) } else { file.into() }
     }
 }
@@ -162,7 +165,9 @@ impl Document {
     }
 
     /// Finds and parses something by its built-in name, or by its path, which ends in `.toml` or contains a separator.
-    pub(super) fn open(kind: Kind, name: &str, folder: &Path) -> Result<Self, SceneError> {
+    pub(super) fn open(kind: Kind, path: &OsStr, folder: &Path) -> Result<Self, SceneError> {
+        // For words, and for names of what is built in, which are UTF-8.
+        let name = &*path.to_string_lossy();
         if kind == Kind::Hand && name.ends_with(".urdf") {
             let remedy = format!("`blindgrasp hand new {name}` writes a hand's file that names it");
             return Err(SceneError::new(
@@ -179,8 +184,8 @@ impl Document {
                 remedy,
             ));
         }
-        if is_path(name) {
-            let path = folder.join(name);
+        if is_path(path) {
+            let path = folder.join(path);
             let text = read_text(&path, ".toml")?;
             let document = Self::parse(&text, &path.to_string_lossy(), path.parent().unwrap_or(folder))?;
             kind.refuse_others(&document.node)?;
@@ -222,8 +227,8 @@ impl Document {
             let mut home = self.home.clone();
             if let Value::String(name) = &node.value {
                 let folder = if node.place.is_in_a_file() { self.home.folder() } else { Path::new("") };
-                let document =
-                    Self::open(kind, name, folder).map_err(|error| error.of_reference(key, &node.place))?;
+                let document = Self::open(kind, name.as_ref(), folder)
+                    .map_err(|error| error.of_reference(key, &node.place))?;
                 (*node, home) = (document.node, document.home);
             }
             if kind == Kind::Hand {
@@ -263,7 +268,7 @@ impl Document {
     pub(super) fn urdf_path(&self) -> Option<PathBuf> {
         match (&self.home, urdf::file_of(&self.node)) {
             (Home::Folder(_), Some(Node { value: Value::String(file), place })) => {
-                Some(self.home.resolve(file, place))
+                Some(self.home.resolve(file.as_ref(), place))
             }
             _ => None,
         }
@@ -311,7 +316,8 @@ pub fn is_of_files(key: &str) -> bool {
 }
 
 /// Returns `true` if a name is that of a file, and not of something built in.
-pub(super) fn is_path(name: &str) -> bool {
+pub(super) fn is_path(name: &OsStr) -> bool {
+    let name = name.to_string_lossy();
     name.ends_with(".toml") || name.contains(['/', '\\'])
 }
 
@@ -351,14 +357,17 @@ fn read_bytes(path: &Path, ending: &str, largest: u64) -> Result<Vec<u8>, SceneE
         };
         fail(word, "check the path")
     };
-    let metadata = std::fs::metadata(path).map_err(unreadable)?;
-    if !metadata.is_file() {
-        return Err(fail("not a file".into(), &format!("name a {ending} file")));
+    let mut file = files::open(path).map_err(|error| match error.kind() {
+        std::io::ErrorKind::InvalidInput => fail(error.to_string(), &format!("name a {ending} file")),
+        _ => unreadable(error),
+    })?;
+    let length = file.metadata().map_err(unreadable)?.len();
+    if length > largest {
+        return Err(fail(format!("{} MiB are too many", length >> 20), "check the path"));
     }
-    if metadata.len() > largest {
-        return Err(fail(format!("{} MiB are too many", metadata.len() >> 20), "check the path"));
-    }
-    std::fs::read(path).map_err(unreadable)
+    let mut bytes = Vec::new();
+    file.read_to_end(&mut bytes).map_err(unreadable)?;
+    Ok(bytes)
 }
 
 impl SceneError {

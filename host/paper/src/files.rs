@@ -10,9 +10,9 @@
 
 use super::page;
 use super::report::Paper;
+use blindgrasp_files::{NewFolder, OutputError};
 use blindgrasp_sim::csv;
-use blindgrasp_sim::run_dir::{RunDir, RunDirError};
-use blindgrasp_sweep::{Output, OutputError};
+use blindgrasp_sweep::{self as sweep, Output};
 use std::io;
 
 /// Runs whose traces are written.
@@ -21,12 +21,12 @@ const TRACES: [&str; 5] = ["hand-arm", "hand-arm-consistent", "prism", "cube", "
 /// The reason for which a report can't be written.
 #[derive(Debug, thiserror::Error)]
 pub enum FilesError {
-    /// A directory or a file.
+    /// A folder or a file.
     #[error(transparent)]
-    Directory(#[from] RunDirError),
+    Output(#[from] OutputError),
     /// A sweep.
     #[error(transparent)]
-    Sweep(#[from] OutputError),
+    Sweep(#[from] sweep::OutputError),
     /// A figure.
     #[error("cannot draw {file}: {reason}")]
     Draw {
@@ -37,37 +37,33 @@ pub enum FilesError {
     },
 }
 
-/// Writes all files.
+/// Writes all files into a folder.
 ///
 /// # Errors
-/// The first that can't be written; those before it are there.
-pub fn write(directory: &RunDir, paper: &Paper) -> Result<(), FilesError> {
-    directory.create()?;
+/// The first that can't be written.
+pub fn write(folder: &NewFolder, paper: &Paper) -> Result<(), FilesError> {
     let json = format!("{:#}\n", paper.json());
-    directory.write("claims.json", |file| file.write_all(json.as_bytes()))?;
-    let figures = directory.below("figures");
-    figures.create()?;
+    folder.write("claims.json", |file| file.write_all(json.as_bytes()))?;
+    folder.below("figures")?;
     for drawn in &paper.figures {
         let failed = |reason| FilesError::Draw { file: drawn.file.to_owned(), reason };
         for (ending, drawing) in ["png", "svg"].into_iter().zip(drawn.files()) {
             let bytes = drawing.map_err(failed)?;
-            figures.write(&format!("{}.{ending}", drawn.file), |file| file.write_all(&bytes))?;
+            folder.write(&format!("figures/{}.{ending}", drawn.file), |file| file.write_all(&bytes))?;
         }
     }
     let page =
         page::page(paper).map_err(|reason| FilesError::Draw { file: "paper.html".to_owned(), reason })?;
-    directory.write("paper.html", |file| file.write_all(page.as_bytes()))?;
-    let sweeps = directory.below("sweeps");
-    sweeps.create()?;
+    folder.write("paper.html", |file| file.write_all(page.as_bytes()))?;
+    let sweeps = folder.below("sweeps")?;
     for sweep in &paper.sweeps {
-        let path = sweeps.path().join(format!("{}.csv", sweep.varied.name));
-        Output::choose(&path)?.write(&sweep.plan, &sweep.rows)?;
+        Output::choose(&sweeps.join(format!("{}.csv", sweep.varied.name)))?
+            .write(&sweep.plan, &sweep.rows)?;
     }
-    let traces = directory.below("traces");
-    traces.create()?;
+    folder.below("traces")?;
     for done in paper.evidence.runs.iter().filter(|done| TRACES.contains(&done.name.as_str())) {
         let fill = |file: &mut dyn io::Write| csv::write(file, &done.run.samples);
-        traces.write(&format!("{}.csv", done.name), fill)?;
+        folder.write(&format!("traces/{}.csv", done.name), fill)?;
     }
     Ok(())
 }

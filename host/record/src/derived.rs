@@ -41,8 +41,9 @@ macro_rules! derived {
 #[rustfmt::skip]
 derived! {
     Time,       Hand,  "time_s",      "s",     "Time of the tick since the device's start, on the device's clock";
-    HostTime,   Hand,  "host_time_s", "s",     "Time of the tick since the beginning of the recording, on the host's clock; of several devices, the same";
-    LostBefore, Hand,  "lost_before", "",      "Records missing between the one before and this one";
+    HostTime,   Hand,  "host_time_s", "s",     "Time of the tick since the beginning of the recording, on the host's clock; it never runs back; of several devices, the same";
+    Session,    Hand,  "session",     "",      "Session of the recording, from 1 on: another begins where the link was cut, or the device has started anew";
+    LostBefore, Hand,  "lost_before", "",      "Records missing between the one before and this one, also across a cut; of a device that has started anew, since its start";
     Angle,      Joint, "angle_rad",   "rad",   "Angle as the controller's estimator sees it; missing where it is not known";
     Speed,      Joint, "speed_rad_s", "rad/s", "Speed as the controller's estimator sees it; missing where it is not known";
 }

@@ -39,7 +39,9 @@ pub enum PilError {
     #[error(transparent)]
     Hand(#[from] SceneError),
     /// The controller refuses the scene's parameters.
-    #[error("control: {0}")]
+    #[error(
+        "control: {0}; of a gain, the hand's own file allows `firmest_factor` ([safety]) times its own: lower it in the scene or with --set, or raise it in that file"
+    )]
     Control(#[from] ParameterError),
     /// The scene has no encoders.
     #[error("sensors.ideal: a firmware has encoders: set it to false")]

@@ -20,7 +20,6 @@ pub mod injection;
 pub mod motors;
 pub mod observe;
 pub mod recorder;
-pub mod run_dir;
 pub mod sample;
 pub mod summary;
 pub mod thinned;

@@ -61,7 +61,7 @@ impl Recorder {
         .with_hand(&hand);
         about.hand_hash = about.hand_model().map_or(0, |model| model.hash());
         about.scene = Some(scene.effective_toml());
-        let mut writer = Writer::create(path, force)?;
+        let mut writer = Writer::create_whole(path, force)?;
         writer.add_world(&hand.to_urdf(), &scene.object.to_obj())?;
         let device = writer.add_device("hand");
         writer.about(device, Stamp(0), &about)?;

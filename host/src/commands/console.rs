@@ -1,7 +1,9 @@
 //! `blindgrasp console`: words for a hand, and what it answers.
 
 use super::{Outcome, in_a_line, ports};
+use crate::terminal;
 use anyhow::{Context, anyhow, bail};
+use blindgrasp::device::interrupt;
 use blindgrasp::device::recorder::{ENDED_ANOTHER, Recorder, Recording};
 use blindgrasp::device::talk::{self, Event, SELDOM, Talk, TalkError, telemetry};
 use blindgrasp::device::transport::{Transport, TransportError};
@@ -15,9 +17,8 @@ use blindgrasp_shared::parameters::{Bound, Each, Parameter, Setting};
 use clap::Args;
 use std::collections::VecDeque;
 use std::fmt::{Display, Write as _};
-use std::io::{self, BufRead as _, IsTerminal as _, Write as _};
+use std::io::{self, BufRead as _, IsTerminal as _};
 use std::path::PathBuf;
-use std::sync::atomic::{AtomicU32, Ordering};
 use std::sync::mpsc::{self, Receiver, TryRecvError};
 use std::thread;
 use std::time::{Duration, Instant};
@@ -80,8 +81,6 @@ pub(crate) struct Arguments {
     force: bool,
 }
 
-static INTERRUPTS: AtomicU32 = AtomicU32::new(0);
-
 /// Runs the command.
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
     let port = ports::given(arguments.port.as_deref())?;
@@ -92,10 +91,9 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
     let recorder = recording
         .as_ref()
         .map(|recording| recording.add("hand", port, arguments.hand.as_slice(), EVERY_TICK));
-    // Without the handler Ctrl-C ends the program; the hand then lets go for want of a heartbeat.
-    let _ = ctrlc::set_handler(|| {
-        if INTERRUPTS.fetch_add(1, Ordering::Relaxed) >= 2 {
-            std::process::exit(130);
+    interrupt::listen_by(|number| {
+        if number > 2 {
+            interrupt::end_now();
         }
     });
     let mut console = Console {
@@ -133,7 +131,10 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
     let totals = console.recorder.as_mut().map(|recorder| recorder.finish(Instant::now()));
     if let (Some(recording), Some(path)) = (recording, &arguments.out) {
         let saved = recording.finish()?;
-        eprintln!("blindgrasp: recorded {}: {saved}", path.display());
+        match saved.bytes {
+            0 => eprintln!("blindgrasp: {}: not written: nothing was recorded", path.display()),
+            _ => eprintln!("blindgrasp: recorded {}: {saved}", path.display()),
+        }
     }
     ended?;
     let whole = totals.transpose()?.is_none_or(|totals| totals.is_whole());
@@ -261,7 +262,7 @@ impl Console {
 
     /// Does what the user wants: one thing at a time, but a stop at once.
     fn obey(&mut self, now: Instant) -> anyhow::Result<()> {
-        let interrupts = INTERRUPTS.load(Ordering::Relaxed);
+        let interrupts = interrupt::count();
         if interrupts > self.interrupts {
             self.interrupts = interrupts;
             self.typed.lines.clear();
@@ -667,7 +668,7 @@ impl Console {
 
 /// Prints a line.
 fn say(line: impl Display) -> anyhow::Result<()> {
-    writeln!(io::stdout().lock(), "{line}").context("cannot print")
+    terminal::print(&format!("{line}\n")).context("cannot print")
 }
 
 /// Returns the error of a line that was lost.

@@ -1,13 +1,14 @@
 //! `blindgrasp export`: a recording as a table.
 
 use super::Outcome;
-use super::output::create;
-use super::recording::{Span, chosen_device, damage_of, reading_bar, start_ns};
+use super::reading::{Span, chosen_device, damage_of, reading_bar, start_ns};
+use crate::terminal;
 use anyhow::Context;
+use blindgrasp::files::NewFile;
 use blindgrasp::record::export::{ExportError, Exported, Format, Request, export};
 use blindgrasp::record::mcap::Recording;
 use clap::{Args, ValueEnum};
-use std::io::{self, Write};
+use std::io::Write;
 use std::path::{Path, PathBuf};
 
 /// Write a recording as a table: a row a record
@@ -66,10 +67,13 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
         start_ns: start_ns(&recording),
     };
     let path = arguments.out.clone().unwrap_or_else(|| arguments.file.with_extension(ending));
-    let to: Box<dyn Write + Send> = if path == Path::new("-") {
-        Box::new(io::stdout())
-    } else {
-        Box::new(create(&path, arguments.force)?)
+    let mut file = match path.as_path() {
+        path if path == Path::new("-") => None,
+        path => Some(NewFile::create(path, arguments.force)?),
+    };
+    let to: Box<dyn Write + Send> = match &mut file {
+        None => terminal::document(),
+        Some(file) => Box::new(file),
     };
     let mut entries = recording.entries()?;
     let bar = reading_bar(&arguments.file);
@@ -80,6 +84,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
         Err(ExportError::Table(error)) if error.is_broken_pipe() => return Ok(Outcome::Shown),
         exported => exported.with_context(|| path.display().to_string())?,
     };
+    file.map_or(Ok(()), NewFile::finish)?;
     let Exported { rows, lost, gaps, ended } = exported;
     eprintln!("blindgrasp: {}: {rows} rows; {lost} records lost, {gaps} gaps", path.display());
     let is_whole = ended.is_none() && entries.damage().is_none();

@@ -1,23 +1,23 @@
 //! `blindgrasp flash`: firmware onto a microcontroller, over a debug probe.
 
 use super::Outcome;
+use crate::terminal;
 use anyhow::{Context, bail};
 use blindgrasp::device::flash::logs::Logs;
 use blindgrasp::device::flash::monitor::{self, Event};
 use blindgrasp::device::flash::probe::{attach, choose, describe, with_options};
 use blindgrasp::device::flash::{Chip, Phase, Progress, download};
-use blindgrasp::device::image::Kind;
 use blindgrasp::device::image::{BUILD_HINT, ExpectedHand, Firmware, Footprint, Kind};
-use blindgrasp::device::options;
 use blindgrasp::device::options::Level;
+use blindgrasp::device::{interrupt, options};
+use blindgrasp::files;
 use blindgrasp::model::HandModel;
 use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 use probe_rs::probe::list::Lister;
 use serde::Serialize;
 use std::fs;
-use std::io::{self, Write};
-use std::path::PathBuf;
+use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -138,7 +138,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
     (report.flashed, report.verified) = (true, verify);
     let outcome = print(&report, arguments.json)?;
     if let Some((control_block, logs)) = follow {
-        let stop = stop_at_interrupt()?;
+        let stop = stop_at_interrupt();
         eprintln!("blindgrasp: logs of the firmware, with the time of this host in UTC; Ctrl-C ends");
         // The same probe, by its serial number: it may come back elsewhere on the bus.
         let connect = || attach(&info, &chip, firmware.device).ok();
@@ -166,11 +166,10 @@ fn newest_image(kind: Kind) -> anyhow::Result<PathBuf> {
 
 fn read(path: &Path) -> anyhow::Result<Vec<u8>> {
     let about = || format!("cannot read the image {}", path.display());
-    let metadata = fs::metadata(path).with_context(about)?;
-    if !metadata.is_file() || metadata.len() > LARGEST_FILE_BYTES {
+    if fs::metadata(path).with_context(about)?.len() > LARGEST_FILE_BYTES {
         bail!("{} is not an image of a microcontroller; give the ELF file that cargo links", path.display());
     }
-    fs::read(path).with_context(about)
+    files::read(path).with_context(about)
 }
 
 /// Returns the follower of the firmware's logs, if it has what that needs.
@@ -221,7 +220,7 @@ fn report<'a>(
 
 fn print(report: &Report<'_>, json: bool) -> anyhow::Result<Outcome> {
     let text = if json { serde_json::to_string(report)? + "\n" } else { describe_report(report) };
-    io::stdout().lock().write_all(text.as_bytes()).context("cannot print the result")?;
+    terminal::print(&text).context("cannot print the result")?;
     Ok(Outcome::Shown)
 }
 
@@ -291,16 +290,16 @@ impl Bars {
 }
 
 /// A flag that Ctrl-C sets.
-fn stop_at_interrupt() -> anyhow::Result<Arc<AtomicBool>> {
+fn stop_at_interrupt() -> Arc<AtomicBool> {
     let stop = Arc::new(AtomicBool::new(false));
     let handle = Arc::clone(&stop);
-    ctrlc::set_handler(move || handle.store(true, Ordering::Relaxed)).context("cannot wait for Ctrl-C")?;
-    Ok(stop)
+    interrupt::listen_by(move |_| handle.store(true, Ordering::Relaxed));
+    stop
 }
 
 fn show(event: Event) -> io::Result<()> {
     match event {
-        Event::Line(line) => writeln!(io::stdout().lock(), "{} {line}", time_of_day()),
+        Event::Line(line) => terminal::print(&format!("{} {line}\n", time_of_day())),
         Event::Note(text) => {
             eprintln!("blindgrasp: {} {text}", time_of_day());
             Ok(())

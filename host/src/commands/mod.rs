@@ -9,13 +9,13 @@ pub(crate) mod hand;
 pub(crate) mod monitor;
 mod not_built;
 pub(crate) mod object;
-mod output;
 #[cfg(feature = "paper")]
 pub(crate) mod paper;
 pub(crate) mod pil;
 mod ports;
+mod reading;
 pub(crate) mod record;
-mod recording;
+pub(crate) mod recording;
 pub(crate) mod replay;
 pub(crate) mod scene;
 #[cfg(unix)]

@@ -2,6 +2,7 @@
 
 use super::Outcome;
 use anyhow::{Context, bail};
+use blindgrasp::device::interrupt;
 use blindgrasp::device::recorder::Recording;
 use blindgrasp::device::transport::ports_in_words;
 use blindgrasp::monitor::input::{Input, Intent, Situation};
@@ -64,9 +65,7 @@ pub(crate) struct Arguments {
     force: bool,
 }
 
-/// Signals to end that came.
-static SIGNALS: AtomicU32 = AtomicU32::new(0);
-/// Those of them that were seen.
+/// Signals to end that were seen.
 static SEEN: AtomicU32 = AtomicU32::new(0);
 
 /// Runs the command.
@@ -107,7 +106,10 @@ fn watch(port: &str, arguments: &Arguments) -> anyhow::Result<Outcome> {
     live.close();
     let saved = recording.map(|recording| recording.finish()).transpose();
     if let (Some(path), Ok(Some(saved))) = (&arguments.out, &saved) {
-        eprintln!("blindgrasp: recorded {}: {saved}", path.display());
+        match saved.bytes {
+            0 => eprintln!("blindgrasp: {}: not written: nothing was recorded", path.display()),
+            _ => eprintln!("blindgrasp: recorded {}: {saved}", path.display()),
+        }
     }
     match ended? {
         Ended::Stopped(true) => eprintln!("blindgrasp: stop: done"),
@@ -166,9 +168,7 @@ struct Restored(ManuallyDrop<DefaultTerminal>);
 impl Restored {
     fn new() -> anyhow::Result<Self> {
         refuse_without_terminal()?;
-        // Without the handler a signal ends the program; a hand then lets go for want of a heartbeat.
-        let _ = ctrlc::set_handler(|| {
-            let signals = SIGNALS.fetch_add(1, Ordering::Relaxed) + 1;
+        interrupt::listen_by(|signals| {
             std::thread::spawn(move || {
                 std::thread::sleep(NOTICING);
                 // A heartbeat that nobody can end would hold the hand closed.
@@ -234,7 +234,7 @@ impl Monitor {
         Self {
             input: Input::default(),
             situation: Situation { is_live: true, is_heard: false, mode: None },
-            signals: SIGNALS.load(Ordering::Relaxed),
+            signals: interrupt::count(),
             unrecorded: None,
             plot: 0,
             window: 1,
@@ -337,7 +337,7 @@ impl Monitor {
 
     /// Returns `true` if another signal to end came.
     fn signalled(&mut self) -> bool {
-        let signals = SIGNALS.load(Ordering::Relaxed);
+        let signals = interrupt::count();
         SEEN.store(signals, Ordering::Relaxed);
         std::mem::replace(&mut self.signals, signals) != signals
     }

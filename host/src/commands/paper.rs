@@ -1,16 +1,16 @@
 //! `blindgrasp paper`: every table, figure and claim of the paper, run and checked.
 
 use super::Outcome;
+use crate::terminal;
 use anyhow::Context;
+use blindgrasp::files::NewFolder;
 use blindgrasp::paper::claim::{Claim, Verdict};
 use blindgrasp::paper::expected::Surprise;
 use blindgrasp::paper::files;
 use blindgrasp::paper::report::{self, Paper};
-use blindgrasp::sim::run_dir::RunDir;
 use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 use std::fmt::Write as _;
-use std::io::{self, Write as _};
 use std::path::PathBuf;
 
 /// Run the simulation and the experiments of the paper, and check each of its claims
@@ -31,11 +31,8 @@ pub(crate) struct Arguments {
 
 /// Runs the command.
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
-    let directory = arguments.out.as_ref().map(|path| RunDir::choose(path, arguments.force)).transpose()?;
-    if let Some(directory) = &directory {
-        // Now, and not after minutes of runs.
-        directory.create()?;
-    }
+    // Now, and not after minutes of runs.
+    let folder = arguments.out.as_ref().map(|path| NewFolder::create(path, arguments.force)).transpose()?;
     let bar = ProgressBar::new(report::runs() as u64);
     let style = "{bar:40} {pos} of {len} runs in {elapsed}  {msg}";
     bar.set_style(ProgressStyle::with_template(style).unwrap_or_else(|_| ProgressStyle::default_bar()));
@@ -47,10 +44,11 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
     })?;
     bar.finish_and_clear();
     let text = if arguments.json { paper.json().to_string() + "\n" } else { table(&paper) };
-    io::stdout().lock().write_all(text.as_bytes()).context("cannot print the claims")?;
-    if let Some(directory) = &directory {
-        files::write(directory, &paper)?;
-        eprintln!("blindgrasp: wrote {}", directory.path().display());
+    terminal::print(&text).context("cannot print the claims")?;
+    if let (Some(folder), Some(path)) = (folder, &arguments.out) {
+        files::write(&folder, &paper)?;
+        folder.finish()?;
+        eprintln!("blindgrasp: wrote {}", path.display());
     }
     eprintln!("blindgrasp: {} runs in {:.0} s on {} cores", paper.runs(), paper.wall_s, paper.cores);
     Ok(if paper.failed() { Outcome::Failed } else { Outcome::Shown })

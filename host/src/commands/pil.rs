@@ -1,6 +1,7 @@
 //! `blindgrasp pil`: the closed loop with the firmware in it.
 
 use super::{Outcome, sim};
+use crate::terminal;
 use anyhow::Context;
 #[cfg(not(unix))]
 use anyhow::bail;
@@ -17,7 +18,6 @@ use blindgrasp::sim::summary::Summary;
 use blindgrasp_shared::link::rate::FIRST_BAUD;
 use clap::Args;
 use serde::Serialize;
-use std::io::{self, Write as _};
 use std::path::{Path, PathBuf};
 
 /// The hand whose firmware is measured if no scene says otherwise.
@@ -211,7 +211,7 @@ fn bench(_scene: &Scene, _arguments: &Arguments) -> anyhow::Result<Outcome> {
 }
 
 fn print(text: &str) -> anyhow::Result<()> {
-    io::stdout().lock().write_all(text.as_bytes()).context("cannot print the summary")
+    terminal::print(text).context("cannot print the summary")
 }
 
 /// The summary as a table.

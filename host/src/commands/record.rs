@@ -1,6 +1,7 @@
 //! `blindgrasp record`: everything that one or more hands say, into one file.
 
 use super::{Outcome, in_a_line, ports};
+use crate::terminal;
 use anyhow::{Context, anyhow, bail};
 use blindgrasp::device::interrupt;
 use blindgrasp::device::recorder::{ENDED_ANOTHER, Recorder, Recording, Totals};
@@ -12,8 +13,6 @@ use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
 use std::collections::BTreeSet;
 use std::fmt::Write as _;
-use std::fs;
-use std::io::{self, Write as _};
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{self, Receiver, RecvTimeoutError, Sender};
@@ -122,7 +121,6 @@ enum News {
 /// The end of the recording of a port.
 struct Ended {
     totals: Totals,
-    gaps: Duration,
     error: Option<Trouble>,
 }
 
@@ -178,7 +176,6 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
                 tell: tell.clone(),
                 ending: &ending,
                 until,
-                gaps: Duration::ZERO,
             };
             scope.spawn(move || attendant.run(line));
         }
@@ -243,13 +240,9 @@ fn finish(
     let mut error = finished.as_ref().err().map(ToString::to_string);
     let saved = finished.unwrap_or_default();
     let mut devices = Vec::new();
-    for (k, Ended { totals, gaps, error: trouble }) in ended.into_iter().enumerate() {
+    for (k, Ended { totals, error: trouble }) in ended.into_iter().enumerate() {
         match trouble {
             Some(Trouble::Nobody(error)) => {
-                if saved.records == 0 {
-                    // Nothing is lost with it, and the next attempt needs no --force.
-                    let _ = fs::remove_file(out);
-                }
                 return Err(error.context(format!("port {}", ports[k])));
             }
             Some(Trouble::Taken(taken)) => error = Some(format!("port {}: {taken}", ports[k])),
@@ -268,7 +261,7 @@ fn finish(
             frames_unusable: totals.unusable,
             frames_damaged: totals.damaged,
             gaps: totals.gaps,
-            gaps_s: gaps.as_secs_f64(),
+            gaps_s: totals.gaps_time.as_secs_f64(),
             decimation: totals.decimation,
         });
     }
@@ -285,7 +278,7 @@ fn finish(
         error,
     };
     let text = if *json { serde_json::to_string(&report)? + "\n" } else { describe(&report) };
-    io::stdout().lock().write_all(text.as_bytes()).context("cannot print the summary")?;
+    terminal::print(&text).context("cannot print the summary")?;
     if let Some(error) = &report.error {
         eprintln!("blindgrasp: {error}");
     }
@@ -341,8 +334,6 @@ struct Attendant<'a> {
     /// Somebody else has an error.
     ending: &'a AtomicBool,
     until: Option<Instant>,
-    /// Time without a session, after the first.
-    gaps: Duration,
 }
 
 /// The end of a talk.
@@ -384,7 +375,7 @@ impl Attendant<'_> {
     fn run(mut self, line: Box<dyn Transport + Send>) {
         let error = self.attend(line).err();
         let error = error.or_else(|| self.recorder.finish(Instant::now()).err().map(Trouble::File));
-        let end = Ended { totals: self.recorder.totals(), gaps: self.gaps, error };
+        let end = Ended { totals: self.recorder.totals(), error };
         let _ = self.tell.send(News::End(self.k, end));
     }
 
@@ -425,9 +416,6 @@ impl Attendant<'_> {
                     self.wait_because(&mut told, words);
                 }
             }
-        }
-        if let Some(since) = cut_at {
-            self.gaps += since.elapsed();
         }
         Ok(())
     }
@@ -502,10 +490,9 @@ impl Attendant<'_> {
     fn hear(&mut self, event: &Event, cut_at: &mut Option<Instant>, now: Instant) {
         match event {
             Event::Open { firmware, ends_another, .. } => {
-                match cut_at.take() {
-                    Some(since) => {
-                        self.gaps += now - since;
-                        let since_s = (now - since).as_secs_f64();
+                match cut_at.take().and_then(|_| self.recorder.silence(now)) {
+                    Some(silence) => {
+                        let since_s = silence.as_secs_f64();
                         self.say(format!("back after {since_s:.1} s: {}", firmware.words));
                     }
                     None => self.say(firmware.words.clone()),

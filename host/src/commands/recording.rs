@@ -1,68 +1,65 @@
-//! The part that commands which read a recording have in common.
+//! `blindgrasp recording`: recordings as files.
 
-use anyhow::{Context, bail};
-use blindgrasp::record::mcap::{Damage, Entries, Recording};
-use clap::Args;
-use indicatif::{ProgressBar, ProgressStyle};
-use std::path::Path;
+use super::Outcome;
+use anyhow::bail;
+use blindgrasp::record::mcap::{Finished, Recording, finish};
+use clap::{Args, Subcommand};
+use std::path::PathBuf;
 
-/// A part of a recording.
+/// Recordings: finish one whose program was killed
 #[derive(Args)]
-pub(super) struct Span {
-    /// From this time on, s since the beginning of the recording
-    #[arg(long, value_name = "S", value_parser = seconds, allow_negative_numbers = true)]
-    pub(super) from: Option<f64>,
-    /// Up to this time, s since the beginning of the recording
-    #[arg(long, value_name = "S", value_parser = seconds, allow_negative_numbers = true)]
-    pub(super) until: Option<f64>,
+#[command(arg_required_else_help = true)]
+pub(crate) struct Arguments {
+    #[command(subcommand)]
+    action: Action,
 }
 
-impl Span {
-    pub(super) fn check(&self) -> anyhow::Result<()> {
-        match (self.from, self.until) {
-            (Some(from), Some(until)) if from > until => {
-                bail!("--from {from} is after --until {until}: exchange them")
-            }
-            _ => Ok(()),
+#[derive(Subcommand)]
+enum Action {
+    Finish(Finish),
+}
+
+/// Give a recording whose program was killed, or whose disk was full, the summary that other tools open it by
+///
+/// All that can be read is in it, to the bit, and what reads recordings here gives the same of it as before. Of a damaged
+/// recording, too, what can be read is written, but to another file.
+///
+/// Exit code 0: it is finished; 1: so is what could be read of a damaged one; 2: it can't be read or written, or bad usage.
+#[derive(Args)]
+struct Finish {
+    /// A recording (MCAP)
+    file: PathBuf,
+    /// Write it to this file [default: in its place]
+    #[arg(long, value_name = "FILE.mcap")]
+    out: Option<PathBuf>,
+    /// Overwrite that file
+    #[arg(long, requires = "out")]
+    force: bool,
+}
+
+/// Runs the command.
+pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
+    let Action::Finish(Finish { file, out, force }) = &arguments.action;
+    let recording = Recording::open(file)?;
+    let shown = file.display();
+    if recording.is_finished() && out.is_none() {
+        eprintln!("blindgrasp: {shown}: is finished already");
+        return Ok(Outcome::Shown);
+    }
+    match finish(&recording, out.as_deref(), *force)? {
+        Finished::Whole { bytes } => {
+            let written = out.as_ref().unwrap_or(file).display();
+            eprintln!("blindgrasp: wrote {written}: finished, {bytes} bytes");
+            Ok(Outcome::Shown)
         }
+        Finished::Damaged { bytes, damage } => {
+            eprintln!("blindgrasp: {shown}: {damage}");
+            let written = out.as_ref().unwrap_or(file).display();
+            eprintln!("blindgrasp: wrote {written}: what could be read, {bytes} bytes");
+            Ok(Outcome::Failed)
+        }
+        Finished::Kept { damage } => bail!(
+            "{shown}: is damaged, and left as it is: {damage}; write what can be read to another file with --out"
+        ),
     }
-}
-
-fn seconds(text: &str) -> Result<f64, String> {
-    match text.parse() {
-        Ok(seconds) if (0.0..f64::INFINITY).contains(&seconds) => Ok(seconds),
-        _ => Err("a time in seconds, from 0 on".into()),
-    }
-}
-
-/// The number of the device that is wanted of a recording.
-pub(super) fn chosen_device(recording: &Recording, wanted: Option<&str>) -> anyhow::Result<usize> {
-    let names = recording.devices();
-    match wanted {
-        Some(wanted) => names.iter().position(|name| name == wanted).with_context(|| {
-            format!("--device: there is no `{wanted}` in the recording; it has {}", names.join(", "))
-        }),
-        None if names.len() == 1 => Ok(0),
-        None if names.is_empty() => bail!("the recording is empty: it has no device"),
-        None => bail!("the recording has several devices: choose one with --device: {}", names.join(", ")),
-    }
-}
-
-/// Returns the beginning of a recording, ns.
-pub(super) fn start_ns(recording: &Recording) -> u64 {
-    recording.span().map_or(0, |(start, _)| start.0)
-}
-
-/// Returns the damage of a recording as far as it was read, in words.
-pub(super) fn damage_of(recording: &Recording, entries: &Entries) -> Option<String> {
-    let damage = Damage { unfinished: !recording.is_finished(), ..entries.damage().clone() };
-    (!damage.is_none() || damage.unfinished).then(|| damage.to_string())
-}
-
-/// A bar over the bytes of a file; hidden where stderr is not a terminal.
-pub(super) fn reading_bar(path: &Path) -> ProgressBar {
-    let bytes = std::fs::metadata(path).map_or(0, |metadata| metadata.len());
-    let style = "{bar:40} {percent:>3} %  {bytes} of {total_bytes}, {eta} left";
-    ProgressBar::new(bytes)
-        .with_style(ProgressStyle::with_template(style).unwrap_or_else(|_| ProgressStyle::default_bar()))
 }

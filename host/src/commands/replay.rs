@@ -1,14 +1,14 @@
 //! `blindgrasp replay`: a recording through the controller again.
 
 use super::Outcome;
-use super::recording::{Span, chosen_device, damage_of, reading_bar, start_ns};
+use super::reading::{Span, chosen_device, damage_of, reading_bar, start_ns};
+use crate::terminal;
 use anyhow::Context;
 use blindgrasp::model::HandModel;
 use blindgrasp::record::mcap::Recording;
 use blindgrasp::record::replay::{Change, Report, Wanted, replay};
 use clap::Args;
 use serde::Serialize;
-use std::io::{self, Write as _};
 use std::path::PathBuf;
 use std::time::Instant;
 
@@ -92,6 +92,6 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
     } else {
         format!("{report}\n{:.2} s, {ticks_per_s:.0} ticks a second\n", wall_s)
     };
-    io::stdout().lock().write_all(text.as_bytes()).context("cannot print the result")?;
+    terminal::print(&text).context("cannot print the result")?;
     Ok(if is_same { Outcome::Shown } else { Outcome::Failed })
 }

@@ -1,6 +1,7 @@
 //! `blindgrasp serve`: a simulated hand behind a serial port.
 
 use super::Outcome;
+use crate::terminal;
 use anyhow::{Context, bail};
 use blindgrasp::device::interrupt;
 use blindgrasp::model::Scene;
@@ -10,8 +11,8 @@ use blindgrasp::rig::serve::{News, Served, serve};
 use blindgrasp::rig::simulated::{Happening, SimulatedHand};
 use blindgrasp_shared::link::rate::FIRST_BAUD;
 use clap::Args;
+use std::ffi::OsString;
 use std::fs;
-use std::io::{self, Write as _};
 use std::path::PathBuf;
 
 /// Simulate a hand behind a serial port, in real time, for everything that talks to one
@@ -24,7 +25,7 @@ use std::path::PathBuf;
 #[derive(Args)]
 pub(crate) struct Arguments {
     /// A built-in scene (prism, cube, ...) with encoders, or the path of a scene file
-    scene: String,
+    scene: OsString,
     /// A symbolic link to the port, to be made
     #[arg(long, value_name = "PATH")]
     link: Option<PathBuf>,
@@ -77,7 +78,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
     };
     let _link = arguments.link.as_ref().map(made).transpose()?;
     interrupt::listen();
-    writeln!(io::stdout().lock(), "port {}", port.display()).context("cannot print the port")?;
+    terminal::print(&format!("port {}\n", port.display())).context("cannot print the port")?;
     let period_s = scene.control.period_s;
     let served = serve(&mut hand, &mut Line::new(arguments.baud), &mut pty, |tick, news| {
         let words = match news {

@@ -1,25 +1,28 @@
 //! `blindgrasp sim`: the closed loop on the host.
 
 use super::Outcome;
+use crate::terminal;
 use anyhow::Context;
+use blindgrasp::files::{self, NewFolder, OutputError};
 use blindgrasp::model::Scene;
-use blindgrasp::record::mcap::RecordingError;
 use blindgrasp::sim::Simulation;
 use blindgrasp::sim::csv::Trace;
 use blindgrasp::sim::recorder::Recorder;
-use blindgrasp::sim::run_dir::{RunDir, RunDirError};
 use blindgrasp::sim::sample::Sample;
 use blindgrasp::sim::summary::Summary;
 use blindgrasp::sim::thinned::Thinned;
 use blindgrasp::view;
 use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
+use std::ffi::OsString;
 use std::fmt::Write as _;
 use std::fs::File;
-use std::io::{self, Write as _};
-use std::path::PathBuf;
+use std::io;
+use std::path::{Path, PathBuf};
 
-/// The file of the samples, in a run's directory.
+/// The effective scene, in a run's folder.
+const SCENE: &str = "scene.toml";
+/// The file of the samples.
 const TRACE: &str = "trace.csv";
 
 /// Run a scene in simulation: the controller of the firmware against the simulated hand and object
@@ -28,7 +31,7 @@ const TRACE: &str = "trace.csv";
 #[derive(Args)]
 pub(crate) struct Arguments {
     #[arg(help = scene_help())]
-    scene: String,
+    scene: OsString,
     /// Write summary, effective scene, trace, plots, pictures, an animation and a recording to this directory; if the name ends in .mcap, write the recording alone, to this file
     #[arg(long, value_name = "DIR|FILE.mcap")]
     out: Option<PathBuf>,
@@ -56,28 +59,24 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
     let mut settings = arguments.settings.clone();
     settings.extend(arguments.duration.map(|s| format!("duration_s={s:?}")));
     let scene = Scene::load(&arguments.scene, &settings)?;
-    let (directory, recording) = match &arguments.out {
-        Some(path) if path.extension().is_some_and(|extension| extension == "mcap") => {
-            (None, Some(path.clone()))
-        }
-        Some(path) => (Some(RunDir::choose(path, arguments.force)?), Some(path.join("record.mcap"))),
-        None => (None, None),
-    };
+    // What can't be written is told after the run, when its summary is safe; not so what may not be.
+    let mut output = arguments.out.as_ref().map(|path| Destination::of(path, arguments.force));
+    if let Some(Err(error)) = output.take_if(|made| !matches!(made, Ok(_) | Err(OutputError::Io { .. }))) {
+        return Err(error.into());
+    }
     for warning in &scene.warnings {
         eprintln!("blindgrasp: warning: {warning}");
     }
     let mut simulation = Simulation::new(&scene).with_context(|| format!("scene {}", scene.name))?;
-    // What can't be written is told after the run, when its summary is safe; not so what is there already.
-    let mut recorder = recording.map(|path| {
-        // Whether it could be made shows in the next step.
-        let _ = directory.as_ref().map(RunDir::create);
-        Recorder::create(&path, arguments.force, &scene, simulation.controller())
-    });
-    if let Some(Err(error)) = recorder.take_if(|made| matches!(made, Err(RecordingError::Exists { .. }))) {
-        return Err(error.into());
-    }
+    let mut recorder = output
+        .as_ref()
+        .and_then(|made| made.as_ref().ok())
+        .map(|to| Recorder::create(&to.recording(), to.force(), &scene, simulation.controller()));
     let bar = progress_bar(scene.duration_s);
-    let mut files = directory.map(Files::begin);
+    let mut files = match &output {
+        Some(Ok(Destination::Folder(folder))) => Some(Files::begin(folder)),
+        _ => None,
+    };
     while let Ok(Some(step)) = simulation.step() {
         bar.set_position((step.t_s * 1e3) as u64);
         if let Some(Ok(recorder)) = &mut recorder {
@@ -91,14 +90,17 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
 
     let summary = simulation.summary();
     let text = if arguments.json { serde_json::to_string(&summary)? + "\n" } else { describe(&summary) };
-    io::stdout().lock().write_all(text.as_bytes()).context("cannot print the summary")?;
-    // The recording is nearly all there: what is wrong with it keeps nothing else from being written.
-    let recorded = recorder.map_or(Ok(()), |made| made.and_then(Recorder::finish).map(|_| ()));
+    terminal::print(&text).context("cannot print the summary")?;
+    if let Some(recorder) = recorder {
+        recorder?.finish()?;
+    }
     if let Some(files) = files {
         files.write(&scene, &summary)?;
     }
-    recorded?;
-    if let Some(path) = &arguments.out {
+    if let (Some(made), Some(path)) = (output, &arguments.out) {
+        if let Destination::Folder(folder) = made? {
+            folder.finish()?;
+        }
         eprintln!("blindgrasp: wrote {}", path.display());
     }
     Ok(if summary.grasp_held { Outcome::Shown } else { Outcome::Failed })
@@ -111,17 +113,47 @@ pub(super) fn progress_bar(duration_s: f64) -> ProgressBar {
         .with_style(ProgressStyle::with_template(style).unwrap_or_else(|_| ProgressStyle::default_bar()))
 }
 
+/// The place that a run is written to.
+enum Destination {
+    Folder(NewFolder),
+    /// A recording alone, and whether it may be overwritten.
+    Recording(PathBuf, bool),
+}
+
+impl Destination {
+    fn of(path: &Path, force: bool) -> Result<Self, OutputError> {
+        if path.extension().is_some_and(|extension| extension == "mcap") {
+            files::check(path, force)?;
+            return Ok(Self::Recording(path.to_owned(), force));
+        }
+        // Of what is written, a scene is what may have been read.
+        files::check(&path.join(SCENE), true)?;
+        Ok(Self::Folder(NewFolder::create(path, force)?))
+    }
+
+    fn recording(&self) -> PathBuf {
+        match self {
+            Self::Folder(folder) => folder.written_to().join("record.mcap"),
+            Self::Recording(path, _) => path.clone(),
+        }
+    }
+
+    fn force(&self) -> bool {
+        matches!(self, Self::Recording(_, true))
+    }
+}
+
 /// The files of a run, beside its recording.
-struct Files {
-    directory: RunDir,
+struct Files<'a> {
+    folder: &'a NewFolder,
     trace: io::Result<Trace<File>>,
     pictured: Thinned,
 }
 
-impl Files {
-    fn begin(directory: RunDir) -> Self {
-        let trace = File::create(directory.path().join(TRACE)).map(Trace::new);
-        Self { directory, trace, pictured: Thinned::default() }
+impl<'a> Files<'a> {
+    fn begin(folder: &'a NewFolder) -> Self {
+        let trace = File::create(folder.written_to().join(TRACE)).map(Trace::new);
+        Self { folder, trace, pictured: Thinned::default() }
     }
 
     fn see(&mut self, sample: &Sample) {
@@ -132,13 +164,11 @@ impl Files {
     }
 
     fn write(self, scene: &Scene, summary: &Summary) -> anyhow::Result<()> {
-        let directory = &self.directory;
-        directory.create()?;
+        let folder = self.folder;
         let summary = serde_json::to_string_pretty(summary)? + "\n";
-        directory.write("summary.json", |file| file.write_all(summary.as_bytes()))?;
-        directory.write("scene.toml", |file| file.write_all(scene.effective_toml().as_bytes()))?;
-        let path = || directory.path().join(TRACE);
-        self.trace.and_then(Trace::finish).map_err(|source| RunDirError::Io { path: path(), source })?;
+        folder.write("summary.json", |file| file.write_all(summary.as_bytes()))?;
+        folder.write(SCENE, |file| file.write_all(scene.effective_toml().as_bytes()))?;
+        self.trace.and_then(Trace::finish).with_context(|| format!("cannot write {TRACE}"))?;
         let joint_names: Vec<String> = scene.joints.iter().map(|joint| joint.name.clone()).collect();
         let report = view::Report {
             title: &scene.name,
@@ -147,9 +177,9 @@ impl Files {
             object: &scene.object,
             samples: &self.pictured.finish(),
         };
-        view::write(directory.path(), &report)?;
+        view::write(folder.written_to(), &report)?;
         #[cfg(feature = "plots")]
-        blindgrasp::plots::write(directory.path(), &report)?;
+        blindgrasp::plots::write(folder.written_to(), &report)?;
         #[cfg(not(feature = "plots"))]
         eprintln!(
             "blindgrasp: no plots: they take `cargo run --release --features plots --` and the same arguments"

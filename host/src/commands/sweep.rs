@@ -1,6 +1,7 @@
 //! `blindgrasp sweep`: a scene over a grid of values.
 
 use super::Outcome;
+use crate::terminal;
 use anyhow::{Context, bail};
 use blindgrasp::device::interrupt;
 use blindgrasp::model::Setting;
@@ -12,7 +13,6 @@ use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
 use std::fmt::Write as _;
-use std::io::{self, Write as _};
 use std::path::PathBuf;
 use std::time::Instant;
 
@@ -126,7 +126,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
     } else {
         describe(&plan, &rows, &overview, wall_s)
     };
-    io::stdout().lock().write_all(text.as_bytes()).context("cannot print the overview")?;
+    terminal::print(&text).context("cannot print the overview")?;
     let written: Vec<String> = [arguments.out.clone()].iter().chain(&pictures).map(name).collect();
     eprintln!("blindgrasp: wrote {}", written.join(", "));
     Ok(Outcome::Shown)

@@ -4,9 +4,10 @@ use super::picture;
 use super::plan::Plan;
 use super::run::Row;
 use super::table::Columns;
+use blindgrasp_files::{self as files, NewFile};
 use blindgrasp_record::table::{self, Format, TableError};
-use std::fs::{self, File};
-use std::io::{self, Write as _};
+use std::fs;
+use std::io;
 use std::path::{Path, PathBuf};
 use thiserror::Error;
 
@@ -26,16 +27,13 @@ pub enum OutputError {
         /// The file.
         path: PathBuf,
     },
-    /// There is such a file, and no journal that says that it is this sweep's.
-    #[error("{}: is there already; choose another --out, or overwrite it with --force", path.display())]
-    Exists {
-        /// The file.
-        path: PathBuf,
-    },
-    /// The file system said no.
+    /// A file can't be written, or may not be.
+    #[error(transparent)]
+    File(#[from] files::OutputError),
+    /// The folder can't be made.
     #[error("cannot write {}", path.display())]
-    Io {
-        /// The file.
+    Folder {
+        /// The folder.
         path: PathBuf,
         /// The cause.
         source: io::Error,
@@ -93,16 +91,11 @@ impl Output {
     pub fn prepare(&self, plan: &Plan, force: bool) -> Result<(), OutputError> {
         if let Some(folder) = self.path.parent() {
             fs::create_dir_all(folder)
-                .map_err(|source| OutputError::Io { path: folder.to_owned(), source })?;
+                .map_err(|source| OutputError::Folder { path: folder.to_owned(), source })?;
         }
         let may_overwrite = force || self.journal().exists();
         for path in [self.path.clone()].into_iter().chain(self.pictures(plan)) {
-            if path.is_dir() {
-                return Err(OutputError::Io { path, source: io::ErrorKind::IsADirectory.into() });
-            }
-            if path.exists() && !may_overwrite {
-                return Err(OutputError::Exists { path });
-            }
+            files::check(&path, may_overwrite)?;
         }
         Ok(())
     }
@@ -121,35 +114,16 @@ impl Output {
         if let Some(drawn) = picture::draw(plan, rows) {
             for (path, bytes) in self.pictures(plan).into_iter().zip(drawn) {
                 let bytes = bytes.map_err(|reason| OutputError::Draw { path: path.clone(), reason })?;
-                in_one_piece(&path, |file| {
-                    file.write_all(&bytes).map_err(|source| OutputError::Io { path: path.clone(), source })
-                })?;
+                files::write(&path, bytes, true)?;
             }
         }
-        in_one_piece(&self.path, |file| {
-            let write = || {
-                let mut table = table::create(self.format, file, Columns::new(plan, rows))?;
-                table.write(rows)?;
-                table.finish()
-            };
-            write().map_err(|source| OutputError::Table { path: self.path.clone(), source })
-        })
+        let mut file = NewFile::create(&self.path, true)?;
+        let mut write = || {
+            let mut table = table::create(self.format, &mut file, Columns::new(plan, rows))?;
+            table.write(rows)?;
+            table.finish()
+        };
+        write().map_err(|source| OutputError::Table { path: self.path.clone(), source })?;
+        Ok(file.finish()?)
     }
-}
-
-/// Writes a file under another name first, and renames it once it is whole and on the disk.
-fn in_one_piece(
-    path: &Path,
-    write: impl FnOnce(&mut File) -> Result<(), OutputError>,
-) -> Result<(), OutputError> {
-    let mut partial = path.to_owned().into_os_string();
-    partial.push(".partial");
-    let partial = PathBuf::from(partial);
-    let failed = |source| OutputError::Io { path: path.to_owned(), source };
-    let mut file = File::create(&partial).map_err(failed)?;
-    let written = write(&mut file).and_then(|()| file.sync_all().map_err(failed));
-    written.and_then(|()| fs::rename(&partial, path).map_err(failed)).inspect_err(|_| {
-        // It is of no use to anybody.
-        let _ = fs::remove_file(&partial);
-    })
 }

@@ -99,7 +99,7 @@ fn mesh(name: &str) -> bool {
     let wanted = Wanted { unit: Some(Unit::Millimetre), fingertip_m: Some(0.01) };
     let check = ObjectCheck::load(name, &wanted).unwrap();
     assert_is_text(&check.text());
-    let Some((shape, _)) = accepted(mesh::load(name, wanted.unit)) else { return false };
+    let Some((shape, _)) = accepted(mesh::load(name.as_ref(), wanted.unit)) else { return false };
     round_trip(&ObjectFile {
         schema: SCHEMA,
         name: "part".into(),

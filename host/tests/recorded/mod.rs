@@ -282,10 +282,15 @@ impl Session {
         self.writer.parameters(self.recorded, self.now(), &[setting]).unwrap();
     }
 
-    /// The device starts anew, and says nothing for a while.
-    pub(crate) fn restart(&mut self, ticks: u32) {
+    /// The link is cut.
+    pub(crate) fn cut(&mut self) {
         let (now, words) = (self.now(), "the port is gone");
         self.writer.gap(self.recorded, now, words).unwrap();
+    }
+
+    /// The device starts anew, and says nothing for a while.
+    pub(crate) fn restart(&mut self, ticks: u32) {
+        self.cut();
         self.device = device(&self.hand.model);
         (self.session, self.tick) = (0, 0);
         for _ in 0..ticks {

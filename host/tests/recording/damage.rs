@@ -2,7 +2,10 @@
 
 use super::hand::{Hand, about, read, settings};
 use super::{is_limited, run_limited};
-use blindgrasp::record::mcap::{Entry, Recording, Stamp, What, Writer};
+use blindgrasp::files::OutputError;
+use blindgrasp::record::mcap::{
+    Decoder, Entry, Finished, Recording, RecordingError, Stamp, What, Writer, finish,
+};
 use std::fs;
 use std::path::Path;
 use std::time::{Duration, Instant};
@@ -16,7 +19,10 @@ fn record(path: &Path, ticks: u64, finish: bool) -> Vec<(u64, usize)> {
     let mut random = fastrand::Rng::with_seed(1);
     let mut writer = Writer::create(path, true).unwrap();
     let device = writer.add_device("hand");
-    let mut saved = vec![(writer.saved().bytes, 0)];
+    // Without the tail. It has its name when something is in it.
+    let mut partial = path.to_owned().into_os_string();
+    partial.push(".partial");
+    let mut saved = vec![(fs::metadata(partial).unwrap().len() - 50, 0)];
     writer.about(device, Stamp(0), &about("two-finger")).unwrap();
     writer.parameters(device, Stamp(0), &settings("two-finger")).unwrap();
     let mut hand = Hand::new(about("two-finger").joint_names.len());
@@ -69,8 +75,9 @@ fn a_file_cut_anywhere_gives_every_checkpoint_before() {
             let least =
                 saved.iter().rev().find(|(bytes, _)| *bytes <= length as u64).map_or(0, |saved| saved.1);
             assert!(given.len() >= least, "{length}: {} of {least}", given.len());
-            // Whole checkpoints or nothing.
-            assert!(saved.iter().any(|saved| saved.1 == given.len()) || given.len() == all.len());
+            // Whole checkpoints or nothing, but for what stands twice: who the hand is, and its parameters.
+            let is_whole = |count: usize| saved.iter().any(|saved| saved.1 == count) || count == all.len();
+            assert!(is_whole(given.len()) || given.len() <= 3, "{length}: {}", given.len());
             if given.len() < all.len() {
                 assert!(entries.damage().unfinished);
             }
@@ -218,4 +225,153 @@ fn ten_thousand_damaged_copies_give_nothing_that_was_not_recorded() {
     );
     assert!(refused < COPIES as usize / 10 && exact > COPIES as usize / 10 && share > 0.5);
     assert!(longest < Duration::from_secs(5), "{longest:?}");
+}
+
+/// Where the chunks of a file are, and how long they are, with their heads.
+fn chunks(bytes: &[u8]) -> Vec<std::ops::Range<usize>> {
+    let mut chunks = Vec::new();
+    let mut at = 8;
+    while at + 9 <= bytes.len() {
+        let length = u64::from_le_bytes(bytes[at + 1..at + 9].try_into().unwrap()) as usize;
+        if bytes[at] == 6 {
+            chunks.push(at..at + 9 + length);
+        }
+        at += 9 + length;
+    }
+    chunks
+}
+
+/// Numbers of the records that a file still gives, and what the decoder counts as lost between them.
+fn decoded(path: &Path) -> (Vec<u32>, u64) {
+    let mut decoder = Decoder::new();
+    let (mut numbers, mut lost) = (Vec::new(), 0);
+    for entry in read(path).0 {
+        if let Some(decoded) = decoder.take(&entry) {
+            if !numbers.is_empty() {
+                lost += decoded.lost_before;
+            }
+            numbers.push(decoded.record.sequence);
+            assert_eq!(decoder.about(0).map(|about| about.hand.as_str()), Some("two-finger"));
+        }
+    }
+    (numbers, lost)
+}
+
+#[test]
+fn a_bad_chunk_costs_its_own_records_whichever_it_is() {
+    let folder = tempfile::tempdir().unwrap();
+    let (path, copy) = (folder.path().join("a.mcap"), folder.path().join("b.mcap"));
+    for finish in [true, false] {
+        record(&path, 4000, finish);
+        let bytes = fs::read(&path).unwrap();
+        let chunks = chunks(&bytes);
+        // One for who the hand is, with the metadata before it, and one for each 40 ticks.
+        assert_eq!(chunks.len(), 101);
+        let all: Vec<u32> = (1..=4000).collect();
+        assert_eq!(decoded(&path), (all.clone(), 0));
+        let mut random = fastrand::Rng::with_seed(7);
+        let mut damage = |which: &[usize], in_the_head: bool| {
+            let mut damaged = bytes.clone();
+            for &k in which {
+                // Content, or what a chunk begins with: kind, length, times, sizes, checksum.
+                let from = chunks[k].start + if in_the_head { 0 } else { 60 };
+                let until = if in_the_head { from + 45 } else { chunks[k].end };
+                damaged[random.usize(from..until)] ^= 1 << random.u32(0..8);
+            }
+            fs::write(&copy, &damaged).unwrap();
+        };
+        // Each by itself, the first among them; then fifty, every other one, all but the last, and fifty with heads that
+        // are damaged.
+        let fifty: Vec<usize> = (0..50).collect();
+        let others: Vec<usize> = (0..101).step_by(2).collect();
+        let most: Vec<usize> = (0..100).collect();
+        let singles: Vec<Vec<usize>> = (0..101).step_by(10).chain([1, 99]).map(|k| vec![k]).collect();
+        for which in singles.iter().chain([&fifty, &others, &most]) {
+            for in_the_head in [false, true] {
+                damage(which, in_the_head);
+                let bad = |tick: &u32| which.contains(&(1 + (*tick as usize - 1) / 40));
+                let (numbers, lost) = decoded(&copy);
+                // Of a head, times can be changed without harm.
+                let kept = |tick: &&u32| bad(tick) || numbers.contains(tick);
+                let gone = all.iter().find(|tick| !kept(tick));
+                assert_eq!(gone, None, "{which:?}, heads: {in_the_head}: {}", read(&copy).1);
+                assert!(in_the_head || numbers.len() == all.iter().filter(|tick| !bad(tick)).count());
+                let between = numbers.windows(2).map(|pair| u64::from(pair[1] - pair[0] - 1)).sum::<u64>();
+                assert_eq!(lost, between, "{which:?}");
+            }
+        }
+    }
+}
+
+#[test]
+fn a_recording_that_was_not_finished_is_finished_and_gives_the_same() {
+    let folder = tempfile::tempdir().unwrap();
+    let (path, other) = (folder.path().join("a.mcap"), folder.path().join("b.mcap"));
+    record(&path, 400, false);
+    // A program that is killed while it writes leaves half a piece behind the end.
+    let mut bytes = fs::read(&path).unwrap();
+    let last = chunks(&bytes).last().unwrap().clone();
+    let half = bytes[last.start..(last.start + last.end) / 2].to_vec();
+    bytes.extend_from_slice(&half);
+    // The writer of this process has the other locked.
+    let path = folder.path().join("killed.mcap");
+    fs::write(&path, &bytes).unwrap();
+    let (before, damage, recording) = read(&path);
+    assert!(damage.unfinished && damage.to_string().contains("`blindgrasp recording finish`"), "{damage}");
+    assert!(matches!(finish(&recording, None, false), Ok(Finished::Whole { .. })));
+    let (after, damage, recording) = read(&path);
+    assert!(recording.is_finished() && damage.is_none() && !damage.unfinished, "{damage}");
+    assert_eq!((before, recording.received()), (after, Some(400)));
+    let summary = mcap::Summary::read(&fs::read(&path).unwrap()).unwrap().unwrap();
+    let named = |name: &str| summary.channels.values().any(|channel| channel.topic == name);
+    assert!(["/hand/received", "/hand/tick", "/hand/about"].into_iter().all(named));
+    assert_eq!((summary.attachment_indexes.len(), summary.chunk_indexes.len()), (1, 11));
+
+    // A damaged one is left as it is; what can be read of it goes to another file, with channels that are introduced anew.
+    bytes.truncate(bytes.len() - half.len());
+    for k in [0, 5] {
+        let chunk = chunks(&bytes)[k].clone();
+        bytes[chunk.start + 60] ^= 1;
+    }
+    fs::write(&path, &bytes).unwrap();
+    let (before, _, recording) = read(&path);
+    assert!(matches!(finish(&recording, None, false), Ok(Finished::Kept { .. })));
+    assert_eq!(fs::read(&path).unwrap(), bytes);
+    assert!(matches!(finish(&recording, Some(&other), false), Ok(Finished::Damaged { .. })));
+    let (after, damage, recording) = read(&other);
+    assert!(recording.is_finished() && damage.places.is_empty(), "{damage}");
+    assert_eq!(before, after);
+    let summary = mcap::Summary::read(&fs::read(&other).unwrap()).unwrap().unwrap();
+    assert!(summary.channels.values().any(|channel| channel.topic == "/hand/tick"
+        && channel.schema.as_ref().is_some_and(|schema| schema.name == "blindgrasp.two_finger.Tick")));
+    // It is not written over what is there.
+    assert!(finish(&recording, Some(&path), false).is_err());
+}
+
+#[test]
+fn a_recording_that_is_being_written_is_nobody_elses() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.mcap");
+    fs::write(&path, "an old one").unwrap();
+    let begin = || Writer::create(&path, true);
+    let mut writer = begin().unwrap();
+    // Nothing is recorded yet: the old one is there, and a second program is refused.
+    let busy = |error: RecordingError| matches!(error, RecordingError::Output(OutputError::Busy(_)));
+    assert!(busy(begin().map(|_| ()).unwrap_err()));
+    writer.checkpoint().unwrap();
+    assert_eq!(fs::read(&path).unwrap(), b"an old one");
+    let device = writer.add_device("hand");
+    writer.about(device, Stamp(0), &about("two-finger")).unwrap();
+    writer.checkpoint().unwrap();
+    let (entries, _, recording) = read(&path);
+    assert!(!entries.is_empty());
+    assert!(busy(begin().map(|_| ()).unwrap_err()));
+    assert!(busy(finish(&recording, None, false).unwrap_err()));
+    writer.finish().unwrap();
+    let names: Vec<_> =
+        fs::read_dir(folder.path()).unwrap().map(|entry| entry.unwrap().file_name()).collect();
+    assert_eq!(names, ["a.mcap"]);
+    // Nobody had a session: the one that is there stays.
+    drop(begin());
+    assert!(fs::read_dir(folder.path()).unwrap().count() == 1 && read(&path).0 == entries);
 }

@@ -1,6 +1,7 @@
 //! Files that are no recording, or none that this program knows.
 
 use super::hand::{Hand, about};
+use blindgrasp::files::OutputError;
 use blindgrasp::record::mcap::{Decoder, Recording, RecordingError, Stamp, Writer};
 use blindgrasp_shared::telemetry::INTERFACE_VERSION;
 use mcap::records::{MessageHeader, Metadata};
@@ -76,10 +77,35 @@ fn a_file_that_is_there_is_kept() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.mcap");
     fs::write(&path, "precious").unwrap();
-    assert!(matches!(Writer::create(&path, false).map(|_| ()), Err(RecordingError::Exists { .. })));
+    assert!(matches!(
+        Writer::create(&path, false).map(|_| ()),
+        Err(RecordingError::Output(OutputError::Exists(_)))
+    ));
     assert_eq!(fs::read(&path).unwrap(), b"precious");
     Writer::create(&path, true).unwrap().finish().unwrap();
     // An empty recording is one.
     let recording = Recording::open(&path).unwrap();
     assert_eq!((recording.devices().len(), recording.span(), recording.is_finished()), (0, None, true));
+}
+
+/// A name more costs what a name costs, however many there are.
+#[test]
+fn as_many_devices_as_there_can_be_are_read_at_once() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.mcap");
+    let options = mcap::WriteOptions::new().profile("blindgrasp").library("blindgrasp 0.1.0");
+    let mut writer = options.create(File::create(&path).unwrap()).unwrap();
+    for k in 0..60_000 {
+        let channel =
+            writer.add_channel(0, &format!("/device{k}/sent"), "blindgrasp", &BTreeMap::new()).unwrap();
+        let header = MessageHeader { channel_id: channel, sequence: 0, log_time: 1, publish_time: 1 };
+        writer.write_to_known_channel(&header, b"").unwrap();
+    }
+    writer.finish().unwrap();
+    let begun = std::time::Instant::now();
+    let recording = Recording::open(&path).unwrap();
+    assert_eq!(recording.devices().len(), 60_000);
+    assert_eq!(recording.entries().unwrap().map(Result::unwrap).count(), 60_000);
+    println!("60,000 devices: {:?}", begun.elapsed());
+    assert!(begun.elapsed().as_secs() < 5, "{:?}", begun.elapsed());
 }

@@ -258,7 +258,7 @@ fn a_recording_of_a_simulation_has_the_shapes_of_hand_and_object() {
         // As the reader of meshes has it, it is a closed body again, with as many triangles.
         let obj = folder.path().join("object.obj");
         std::fs::write(&obj, &object).unwrap();
-        let (shape, notices) = mesh::load(obj.to_str().unwrap(), Some(mesh::Unit::Metre)).unwrap();
+        let (shape, notices) = mesh::load(obj.as_os_str(), Some(mesh::Unit::Metre)).unwrap();
         assert!(notices.is_empty(), "{notices:?}");
         let ShapeFile::Mesh { vertices_m, triangles, .. } = shape else { panic!("{shape:?}") };
         assert_eq!(vertices_m.len(), expected.len());

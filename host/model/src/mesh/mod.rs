@@ -42,6 +42,7 @@ use super::library::Home;
 use super::tree::{Entry, Node, Value};
 use repair::{Repaired, repair};
 use soup::{Problem, Soup};
+use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 
 pub use unit::Unit;
@@ -106,7 +107,7 @@ pub(super) fn expand(object: &mut Node, home: &Home, notices: &mut Vec<Notice>) 
     let of_file = |problem: Problem| {
         SceneError::new(key("file"), format!("`{file}`: {}", problem.what), problem.remedy).at(&place)
     };
-    let soup = parse(file, home, &entry.node.place).map_err(of_file)?;
+    let soup = parse(file.as_ref(), home, &entry.node.place).map_err(of_file)?;
     let unit = match unit.as_ref().map(|entry| (&entry.node.value, &entry.place)) {
         Some((Value::String(word), place)) => match Unit::of(word) {
             Some(unit) => unit,
@@ -155,8 +156,8 @@ fn take(table: &mut Node, key: &str) -> Option<Entry> {
 ///
 /// # Errors
 /// One line: which file, what is wrong, what to do.
-pub fn load(path: &str, unit: Option<Unit>) -> Result<(ShapeFile, Vec<Notice>)> {
-    let place = Place::whole(path);
+pub fn load(path: &OsStr, unit: Option<Unit>) -> Result<(ShapeFile, Vec<Notice>)> {
+    let place = Place::of_path(path);
     let of_file = |problem: Problem| SceneError::new("", problem.what, problem.remedy).at(&place);
     let soup = parse(path, &Home::Folder(PathBuf::new()), &place).map_err(of_file)?;
     let Some(unit) = unit else {
@@ -178,16 +179,16 @@ fn excerpt(text: &str) -> String {
 }
 
 /// Returns `true` if a name is that of a mesh file.
-pub fn is_mesh(name: &str) -> bool {
-    ending(name).is_some_and(|ending| ending == "stl" || ending == "obj")
+pub fn is_mesh(name: impl AsRef<OsStr>) -> bool {
+    ending(name.as_ref()).is_some_and(|ending| ending == "stl" || ending == "obj")
 }
 
-fn ending(name: &str) -> Option<String> {
+fn ending(name: &OsStr) -> Option<String> {
     Path::new(name).extension().map(|ending| ending.to_string_lossy().to_ascii_lowercase())
 }
 
 /// Reads a file by its name's ending.
-fn parse(name: &str, home: &Home, named_at: &Place) -> std::result::Result<Soup, Problem> {
+fn parse(name: &OsStr, home: &Home, named_at: &Place) -> std::result::Result<Soup, Problem> {
     let read = match ending(name).as_deref() {
         Some("stl") => stl::read,
         Some("obj") => obj::read,

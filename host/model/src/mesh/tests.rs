@@ -159,7 +159,7 @@ fn a_scene_with_a_mesh_needs_no_file() {
     let by_reference = cube.replace("object = \"cube\"", "object = \"parts/block.toml\"");
     let path = folder.join("scene.toml");
     std::fs::write(&path, by_reference).unwrap();
-    let scene = Scene::load(path.to_str().unwrap(), &[]).unwrap();
+    let scene = Scene::load(path.as_os_str(), &[]).unwrap();
     assert_eq!(scene.object.faces.len(), 6);
     assert!((scene.mass_kg / (20.0 * 0.048f64.powi(3)) - 1.0).abs() < 1e-6);
     let text = scene.effective_toml();
@@ -169,7 +169,7 @@ fn a_scene_with_a_mesh_needs_no_file() {
     // Settings reach the mesh before it is read, and what stays of it after.
     let set = |settings: &[&str]| {
         let settings: Vec<String> = settings.iter().map(|s| s.to_string()).collect();
-        Scene::load(path.to_str().unwrap(), &settings)
+        Scene::load(path.as_os_str(), &settings)
     };
     let half =
         ["object.shape.mesh.scale=0.5", "object.shape.mesh.flat_deg=1", "contact.*.point_m=[0, -0.012, 0]"];
@@ -285,12 +285,12 @@ fn units_and_scales_give_metres() {
     let folder = folder("units");
     let path = folder.join("part.stl");
     std::fs::write(&path, binary(&bracket())).unwrap();
-    let size = |unit| match load(path.to_str().unwrap(), Some(unit)).unwrap().0 {
+    let size = |unit| match load(path.as_os_str(), Some(unit)).unwrap().0 {
         ShapeFile::Mesh { vertices_m, .. } => vertices_m.iter().map(|v| v[0]).fold(0.0, f64::max),
         _ => 0.0,
     };
     assert_eq!((size(Unit::Millimetre), size(Unit::Centimetre)), (0.06, 0.6));
-    let error = load(path.to_str().unwrap(), None).unwrap_err();
+    let error = load(path.as_os_str(), None).unwrap_err();
     assert_eq!(
         error.to_string(),
         format!(

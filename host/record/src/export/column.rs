@@ -132,6 +132,7 @@ impl Column {
         match self.source {
             Source::Derived(Derived::Time, _) => Cell::Double(decoded.time_s),
             Source::Derived(Derived::HostTime, _) => Cell::Double(seconds(decoded.at.0, row.start_ns)),
+            Source::Derived(Derived::Session, _) => Cell::Whole(decoded.session.into()),
             Source::Derived(Derived::LostBefore, _) => Cell::Whole(decoded.lost_before as i64),
             Source::Derived(Derived::Angle, joint) => real(decoded.angles_rad.as_slice(), joint),
             Source::Derived(Derived::Speed, joint) => real(decoded.speeds_rad_s.as_slice(), joint),
@@ -186,7 +187,7 @@ fn kind_of(kind: signals::Kind) -> Kind {
 fn kind_of_derived(derived: Derived) -> Kind {
     match derived {
         Derived::Time | Derived::HostTime => Kind::Double,
-        Derived::LostBefore => Kind::Whole,
+        Derived::Session | Derived::LostBefore => Kind::Whole,
         Derived::Angle | Derived::Speed => Kind::Real,
     }
 }

@@ -143,6 +143,7 @@ fn read<E: Iterator<Item = Result<Entry, RecordingError>>>(
         (request.from_s.unwrap_or(f64::NEG_INFINITY), request.until_s.unwrap_or(f64::INFINITY));
     let mut decoder = Decoder::new();
     let mut exported = Exported::default();
+    let mut is_cut = false;
     let mut about: Option<Box<About>> = None;
     let mut rows = Vec::with_capacity(BATCH);
     while let Some(entry) = entries.next() {
@@ -165,9 +166,8 @@ fn read<E: Iterator<Item = Result<Entry, RecordingError>>>(
             }
             about = Some(new.clone());
         }
-        let is_cut = matches!(entry.what, What::Gap { .. });
+        is_cut |= matches!(entry.what, What::Gap { .. }) && exported.rows > 0;
         let Some(decoded) = decoder.take(&entry) else {
-            exported.gaps += u64::from(is_cut && exported.rows > 0);
             if let (What::About(_), Some(obstacle)) = (&entry.what, decoder.obstacle(entry.device)) {
                 return Err(obstacle.into());
             }
@@ -183,8 +183,9 @@ fn read<E: Iterator<Item = Result<Entry, RecordingError>>>(
         exported.rows += 1;
         if exported.rows > 1 {
             exported.lost += decoded.lost_before;
-            exported.gaps += u64::from(decoded.lost_before > 0);
+            exported.gaps += u64::from(is_cut || decoded.lost_before > 0);
         }
+        is_cut = false;
         let joint_count = about.as_ref().map_or(0, |about| about.joint_names.len());
         rows.push(Row::of(decoded, request.start_ns, joint_count));
         if rows.len() == BATCH {

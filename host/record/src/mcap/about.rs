@@ -88,6 +88,12 @@ impl About {
         }
     }
 
+    /// Returns `true` if another session, too, was with this firmware, as far as it says.
+    pub(super) fn is_same_firmware(&self, other: &Self) -> bool {
+        let of = |about: &Self| (about.image.clone(), about.build_hash, about.hand_hash, about.period_us);
+        of(self) == of(other)
+    }
+
     /// Adds the hand's file, if it is the hand that the device was built for: its joints have names then, and its counts
     /// become angles.
     #[must_use]

@@ -21,12 +21,19 @@ pub type Record = telemetry::Record<MAX_JOINTS>;
 /// After how many time constants of its filter a speed is told: an error of the start has faded to 1e-7 then.
 const SETTLED: f32 = 8.0;
 
+/// A record may come so much later than another in comparison with its tick, s, and a device's clock be so slow in
+/// comparison with the host's: a simulated one that has not enough of a processor.
+const LATE_S: f64 = 0.5;
+const SLOWEST: f64 = 0.8;
+
 /// A record, and what follows from those before it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Decoded {
     /// The device of the recording.
     pub device: usize,
-    /// The time of the tick, on the host's clock.
+    /// Which of its sessions, from 1 on.
+    pub session: u32,
+    /// The time of the tick, on the host's clock; never before that of the record before.
     pub at: Stamp,
     /// The arrival of the record.
     pub arrived: Stamp,
@@ -34,7 +41,9 @@ pub struct Decoded {
     pub time_s: f64,
     /// The record.
     pub record: Record,
-    /// Records that are missing between the one before, which may have been an input record, and this one.
+    /// Records that are missing between the one before, which may have been an input record, and this one: also where the link
+    /// was cut between them. Of a device that has started anew, those since its start; how many it had still sent before
+    /// nobody can know.
     pub lost_before: u64,
     /// Joint angles, rad; empty where the hand or the counts are not known.
     pub angles_rad: List<f32, MAX_JOINTS>,
@@ -129,8 +138,19 @@ pub(super) struct Track {
     /// Records until the speed is told.
     unsettled: u32,
     clock: Option<Clock>,
-    /// Sequence number and tick of the last record.
-    last: Option<(u32, u32)>,
+    session: u32,
+    last: Option<Last>,
+    /// The link was cut since.
+    is_cut: bool,
+}
+
+/// The last record.
+#[derive(Clone, Copy, Debug)]
+struct Last {
+    sequence: u32,
+    tick: u32,
+    arrived: Stamp,
+    at: Stamp,
 }
 
 impl Track {
@@ -143,12 +163,19 @@ impl Track {
             tracks: Tracks::new(),
             unsettled: 0,
             clock: None,
+            session: 0,
             last: None,
+            is_cut: false,
         }
     }
 
     /// A session begins.
     pub(super) fn about(&mut self, about: &About) {
+        self.session += 1;
+        if self.about.as_ref().is_some_and(|before| !before.is_same_firmware(about)) {
+            // Nothing goes on that began there.
+            (self.clock, self.last) = (None, None);
+        }
         self.config = about.hand_model().map(|model| Config { period_us: about.period_us, ..model.config });
         self.estimator = None;
         self.about = Some(about.clone());
@@ -163,11 +190,10 @@ impl Track {
         }
     }
 
-    /// The link was cut: what comes next begins anew.
+    /// The link was cut. What comes next may go on from before, or begin anew.
     pub(super) fn restart(&mut self) {
         self.hole();
-        self.clock = None;
-        self.last = None;
+        self.is_cut = true;
     }
 
     /// Something of the recording is lost; sequence numbers tell how many records.
@@ -196,20 +222,22 @@ impl Track {
         let (sequence, tick) = (record.sequence, record.tick);
         let mut lost_before = 0;
         let mut ticks = None;
-        if let Some((last_sequence, last_tick)) = self.last {
-            let ahead = sequence.wrapping_sub(last_sequence);
-            if (1..1 << 31).contains(&ahead) {
-                lost_before = u64::from(ahead - 1);
-                ticks = Some(tick.wrapping_sub(last_tick));
+        if let Some(last) = self.last {
+            if self.goes_on(&last, sequence, tick, arrived) {
+                lost_before = u64::from(sequence.wrapping_sub(last.sequence) - 1);
+                ticks = Some(tick.wrapping_sub(last.tick));
             } else {
-                // Backwards: the device has started anew, and nobody noticed.
+                // It has sent as many since its start.
+                lost_before = sequence.into();
                 self.clock = None;
             }
         }
-        self.last = Some((sequence, tick));
+        self.is_cut = false;
         let period_us = self.about.as_ref().map(|about| about.period_us);
         let clock = period_us.map(|us| self.clock.get_or_insert_with(|| Clock::new(us, tick, arrived)));
         let at = clock.map_or(arrived, |clock| clock.map(tick, arrived));
+        let at = self.last.map_or(at, |last| at.max(last.at));
+        self.last = Some(Last { sequence, tick, arrived, at });
         let time_s = match (&self.clock, period_us) {
             (Some(clock), Some(us)) => (u128::from(clock.tick()) * u128::from(us)) as f64 / 1e6,
             _ => 0.0,
@@ -217,6 +245,7 @@ impl Track {
         let none = List::default;
         let mut decoded = Decoded {
             device: self.device,
+            session: self.session,
             at,
             arrived,
             time_s,
@@ -227,6 +256,23 @@ impl Track {
         };
         self.estimate(&mut decoded, ticks);
         decoded
+    }
+
+    /// Returns `true` if a record comes from the same life of the device as the last one: its numbers go on, and where the link was cut,
+    /// so does its time.
+    fn goes_on(&self, last: &Last, sequence: u32, tick: u32, arrived: Stamp) -> bool {
+        let ahead = |now: u32, before: u32| (1..1 << 31).contains(&now.wrapping_sub(before));
+        if !ahead(sequence, last.sequence) || !ahead(tick, last.tick) {
+            return false;
+        }
+        let Some(period_us) = self.about.as_ref().map(|about| about.period_us).filter(|_| self.is_cut) else {
+            return true;
+        };
+        let passed_s = arrived.0.saturating_sub(last.arrived.0) as f64 * 1e-9;
+        let device_s = |ticks: u32| f64::from(ticks) * f64::from(period_us) * 1e-6;
+        // One that started since has counted less than has passed, both since its start and since the last record.
+        let is_younger = device_s(tick) < passed_s + LATE_S;
+        !is_younger || device_s(tick.wrapping_sub(last.tick)) > SLOWEST * passed_s - LATE_S
     }
 
     /// Angles and speeds. `ticks` is how many have passed since the record before, if that is known.

@@ -1,19 +1,17 @@
 //! Errors in writing and reading recordings.
 
 use super::writer::Saved;
+use blindgrasp_files::OutputError;
 use blindgrasp_shared::telemetry::INTERFACE_VERSION;
 use std::io;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// The reason for which a recording can't be written or read.
 #[derive(Debug, thiserror::Error)]
 pub enum RecordingError {
-    /// There is a file already.
-    #[error("{}: is there already; choose another file, or overwrite it with --force", .path.display())]
-    Exists {
-        /// The file.
-        path: PathBuf,
-    },
+    /// The file can't be made, or get its name.
+    #[error(transparent)]
+    Output(#[from] OutputError),
     /// The file system says no.
     #[error("cannot {action} {}", .path.display())]
     Io {
@@ -25,13 +23,13 @@ pub enum RecordingError {
         source: io::Error,
     },
     /// Nothing can be added any more.
-    #[error("the recording has stopped: {problem}; {} is whole and holds what came before: {saved}", .path.display())]
+    #[error("the recording has stopped: {problem}; {}", remains(.path, .saved))]
     Stopped {
         /// The file.
         path: PathBuf,
         /// The words of the file system; a full disk among others.
         problem: String,
-        /// The contents of the file.
+        /// The contents of the file; nothing if there is none.
         saved: Saved,
     },
     /// Something that MCAP can't hold.
@@ -75,6 +73,17 @@ pub enum RecordingError {
         /// The program that recorded it.
         program: String,
     },
+}
+
+fn remains(path: &Path, saved: &Saved) -> String {
+    let path = path.display();
+    if saved.bytes == 0 {
+        format!("nothing is written to {path}")
+    } else {
+        format!(
+            "{path} is whole and holds what came before: {saved}; once there is room, `blindgrasp recording finish` gives it the end that other tools want"
+        )
+    }
 }
 
 fn of(library: &str) -> String {

@@ -6,9 +6,8 @@
 //! or in the first, leaves the old file with something behind its end; readers stop at the end. If a piece can't be
 //! written (the disk is full), the old tail, whose blocks the file has, is put back.
 
-use std::fs::{File, OpenOptions};
+use blindgrasp_files::{NewFile, OutputError};
 use std::io::{self, Write};
-use std::path::Path;
 
 /// End of the data without a checksum, footer without a summary, magic.
 pub(super) const TAIL: [u8; 50] = {
@@ -29,18 +28,28 @@ pub(super) const TAIL: [u8; 50] = {
 /// A file that grows by pieces.
 #[derive(Debug)]
 pub(super) struct WholeFile {
-    file: File,
+    file: NewFile,
     /// Bytes before the tail.
     length: u64,
 }
 
 impl WholeFile {
-    /// Makes a file, or empties one with `force`.
-    pub(super) fn create(path: &Path, force: bool) -> io::Result<Self> {
-        let mut options = OpenOptions::new();
-        options.write(true);
-        let file = if force { options.create(true).truncate(true) } else { options.create_new(true) };
-        Ok(Self { file: file.open(path)?, length: 0 })
+    /// Begins in an empty file.
+    pub(super) fn new(file: NewFile) -> Self {
+        Self { file, length: 0 }
+    }
+
+    /// Returns `true` if the file has its name.
+    pub(super) fn is_published(&self) -> bool {
+        self.file.is_published()
+    }
+
+    /// Gives the file its name.
+    ///
+    /// # Errors
+    /// As [`NewFile::publish`].
+    pub(super) fn publish(&mut self) -> Result<(), OutputError> {
+        self.file.publish()
     }
 
     /// Bytes that are safe, without the tail.
@@ -79,26 +88,27 @@ impl WholeFile {
         if put.is_err() && self.length > 0 {
             // Nothing more can be done than to try; the first error is the one to tell.
             let _ = self.write_at(&TAIL, self.length);
-            let _ = self.file.set_len(self.length + TAIL.len() as u64);
+            let _ = self.file.file().set_len(self.length + TAIL.len() as u64);
         }
         put
     }
 
     #[cfg(unix)]
     fn write_at(&mut self, bytes: &[u8], at: u64) -> io::Result<()> {
-        std::os::unix::fs::FileExt::write_all_at(&self.file, bytes, at)
+        std::os::unix::fs::FileExt::write_all_at(self.file.file(), bytes, at)
     }
 
     #[cfg(not(unix))]
     fn write_at(&mut self, bytes: &[u8], at: u64) -> io::Result<()> {
         use std::io::{Seek, SeekFrom};
-        self.file.seek(SeekFrom::Start(at))?;
-        self.file.write_all(bytes)
+        let mut file = self.file.file();
+        file.seek(SeekFrom::Start(at))?;
+        file.write_all(bytes)
     }
 
     /// Hands everything to the disk.
     pub(super) fn sync(&mut self) -> io::Result<()> {
         self.file.flush()?;
-        self.file.sync_data()
+        self.file.file().sync_data()
     }
 }

@@ -27,6 +27,8 @@
 //!
 //! - A **session** begins where a device says who it is. A **gap** is where the link was cut.
 //! - The file is whole at every checkpoint, at most half a second apart (`file`).
+//! - **What everything hangs on** stands twice, so that damage costs no more than its own records: what a device and its
+//!   parameters are is also metadata, before the chunk of its message.
 //! - **Numbers**: messages of a channel are numbered without holes, so that what a damaged file has lost can be told
 //!   exactly; channels have fixed numbers, so that a chunk can be read without the one that introduced its channels.
 
@@ -35,6 +37,7 @@ mod clock;
 mod decoder;
 mod error;
 mod file;
+mod finish;
 mod message;
 mod reader;
 mod salvage;
@@ -44,6 +47,7 @@ mod writer;
 pub use about::{About, Setting};
 pub use decoder::{Arrival, Decoded, Decoder, Record};
 pub use error::RecordingError;
+pub use finish::{Finished, finish};
 pub use message::{Level, LinkStatus};
 pub use reader::{Damage, Entries, Entry, Place, Recording, What};
 pub use writer::{Saved, World, Writer};
@@ -127,6 +131,27 @@ impl Kind {
     fn of_topic(topic: &str) -> Option<(&str, Self)> {
         let (device, word) = topic.strip_prefix('/')?.split_once('/')?;
         Some((device, CHANNELS.into_iter().find(|kind| kind.word() == word)?))
+    }
+}
+
+/// Keys of metadata that hold a message a second time.
+mod twin {
+    /// The device's name.
+    pub(super) const DEVICE: &str = "device";
+    /// Channel and number of the message, and its time, ns.
+    pub(super) const CHANNEL: &str = "channel";
+    pub(super) const SEQUENCE: &str = "sequence";
+    pub(super) const TIME_NS: &str = "time_ns";
+    /// The message, which is JSON.
+    pub(super) const JSON: &str = "json";
+}
+
+/// Name of metadata, by what is in it: other tools want each to be another.
+fn metadata_name(metadata: &BTreeMap<String, String>) -> String {
+    let of = |key: &str| metadata.get(key).map_or("", String::as_str);
+    match metadata.contains_key(twin::JSON) {
+        true => format!("{METADATA}.{}.{}.{}", of(twin::DEVICE), of(twin::CHANNEL), of(twin::SEQUENCE)),
+        false => METADATA.to_owned(),
     }
 }
 

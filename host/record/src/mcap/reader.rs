@@ -5,13 +5,15 @@ use super::error::RecordingError;
 use super::message::{Level, LinkStatus, Log};
 use super::salvage::{Piece, Pieces, string};
 use super::writer::GAP;
-use super::{FORMAT, Kind, LIBRARY, PROFILE, Stamp};
+use super::{CHANNELS, Device, FORMAT, Kind, PROFILE, Stamp, twin};
 use ::mcap::records::op;
+use blindgrasp_files as files;
 use prost::Message;
-use std::collections::{HashMap, VecDeque};
+use std::collections::{BTreeMap, HashMap, VecDeque};
 use std::fs::File;
 use std::io::{self, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
+use std::str::FromStr;
 
 pub use super::salvage::{Damage, Place};
 
@@ -85,7 +87,7 @@ impl Recording {
     /// It is not a recording, or one of a newer format, or can't be read at all.
     pub fn open(path: &Path) -> Result<Self, RecordingError> {
         let unreadable = |source| RecordingError::Io { action: "read", path: path.into(), source };
-        let mut file = File::open(path).map_err(unreadable)?;
+        let mut file = files::open(path).map_err(unreadable)?;
         let mut magic = Vec::new();
         (&mut file).take(::mcap::MAGIC.len() as u64).read_to_end(&mut magic).map_err(unreadable)?;
         if magic != ::mcap::MAGIC {
@@ -99,11 +101,12 @@ impl Recording {
             match piece {
                 Piece::Header { profile, library } => {
                     ours |= profile == PROFILE;
-                    channels.fixed = library == LIBRARY;
+                    channels.fixed |= profile == PROFILE;
                     writer = Some(library);
                 }
                 Piece::Metadata(metadata) => {
-                    ours = true;
+                    (ours, channels.fixed) = (true, true);
+                    channels.take_twin(&metadata);
                     let theirs = metadata.get("format").and_then(|format| format.parse().ok()).unwrap_or(0);
                     if theirs > FORMAT {
                         let version = metadata.get("host_version").map_or("?", String::as_str);
@@ -115,6 +118,7 @@ impl Recording {
                         });
                     }
                 }
+                Piece::Attachment(_) => {}
                 // Who says clearly to be somebody else is.
                 Piece::Chunk if writer.is_some() && !ours => break,
                 Piece::Chunk => {
@@ -134,7 +138,7 @@ impl Recording {
         if !ours {
             return Err(RecordingError::NotARecording { path: path.into(), library });
         }
-        let mut file = File::open(path).map_err(unreadable)?;
+        let mut file = files::open(path).map_err(unreadable)?;
         let summary = Summary::read(&mut file).map_err(unreadable)?;
         if let Some(summary) = &summary {
             summary.channels.iter().for_each(|channel| channels.take(channel));
@@ -149,6 +153,15 @@ impl Recording {
     /// Names of the devices; [`Entry::device`] counts them.
     pub fn devices(&self) -> &[String] {
         &self.channels.names
+    }
+
+    /// Returns its file.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    pub(super) fn channels(&self) -> &Channels {
+        &self.channels
     }
 
     /// Returns the library that wrote it.
@@ -189,7 +202,7 @@ impl Recording {
     /// The file can't be read any more.
     pub fn entries(&self) -> Result<Entries, RecordingError> {
         let unreadable = |source| RecordingError::Io { action: "read", path: self.path.clone(), source };
-        let pieces = File::open(&self.path).and_then(Pieces::new).map_err(unreadable)?;
+        let pieces = files::open(&self.path).and_then(Pieces::new).map_err(unreadable)?;
         Ok(Entries {
             path: self.path.clone(),
             pieces,
@@ -205,8 +218,9 @@ impl Recording {
 
 /// The channels of a file.
 #[derive(Clone, Debug, Default)]
-struct Channels {
+pub(super) struct Channels {
     names: Vec<String>,
+    by_name: HashMap<String, usize>,
     known: HashMap<u16, (usize, Kind)>,
     /// `true` if our own writer gave the numbers, so that a channel can be known by its number alone.
     fixed: bool,
@@ -214,7 +228,7 @@ struct Channels {
 
 impl Channels {
     /// Takes the record of a channel; what is none of ours is left out.
-    fn take(&mut self, record: &[u8]) {
+    pub(super) fn take(&mut self, record: &[u8]) {
         let _ = self.try_take(record);
     }
 
@@ -225,19 +239,42 @@ impl Channels {
         if matches!(kind, Kind::Received | Kind::Sent) && encoding != PROFILE {
             return None;
         }
-        let number = u16::from_le_bytes([a, b]);
-        let device = match self.names.iter().position(|known| known == name) {
-            Some(device) => device,
-            None => {
-                self.names.push(name.into());
-                self.names.len() - 1
-            }
-        };
-        self.known.insert(number, (device, kind));
+        let device = self.device(name);
+        self.known.insert(u16::from_le_bytes([a, b]), (device, kind));
         Some(())
     }
 
-    fn of(&self, number: u16) -> Option<(usize, Kind)> {
+    fn device(&mut self, name: &str) -> usize {
+        if let Some(&device) = self.by_name.get(name) {
+            return device;
+        }
+        self.by_name.insert(name.to_owned(), self.names.len());
+        self.names.push(name.to_owned());
+        self.names.len() - 1
+    }
+
+    /// Takes the channels of the device that a message's twin is about, and gives the message.
+    pub(super) fn take_twin(&mut self, metadata: &BTreeMap<String, String>) -> Option<Numbered> {
+        fn number<T: FromStr>(metadata: &BTreeMap<String, String>, key: &str) -> Option<T> {
+            metadata.get(key)?.parse().ok()
+        }
+        let channel = number(metadata, twin::CHANNEL)?;
+        let (numbered, kind) = Kind::of_channel(channel)?;
+        let device = self.device(metadata.get(twin::DEVICE)?);
+        for kind in CHANNELS {
+            self.known.entry(kind.channel(Device(numbered))).or_insert((device, kind));
+        }
+        let what = what(kind, metadata.get(twin::JSON)?.as_bytes(), false);
+        let (sequence, at) = (number(metadata, twin::SEQUENCE)?, Stamp(number(metadata, twin::TIME_NS)?));
+        Some(Numbered { channel, sequence, device, kind, at, what })
+    }
+
+    /// Name of a device.
+    pub(super) fn name(&self, device: usize) -> Option<&str> {
+        self.names.get(device).map(String::as_str)
+    }
+
+    pub(super) fn of(&self, number: u16) -> Option<(usize, Kind)> {
         self.known.get(&number).copied().or_else(|| {
             Kind::of_channel(number).filter(|&(device, _)| self.fixed && device < self.names.len().max(1))
         })
@@ -286,7 +323,11 @@ impl Entries {
                 State::Ended => return Ok(None),
                 State::Between => match self.pieces.next()? {
                     Some(Piece::Chunk) => self.state = State::InChunk,
-                    Some(_) => {}
+                    Some(Piece::Metadata(metadata)) => {
+                        let message = self.channels.take_twin(&metadata);
+                        self.take(message);
+                    }
+                    Some(Piece::Header { .. } | Piece::Attachment(_)) => {}
                     None => {
                         self.count_end();
                         self.state = State::Ended;
@@ -311,7 +352,8 @@ impl Entries {
         let ahead = sequence.wrapping_sub(*next);
         let damage = self.pieces.damage_mut();
         if ahead >= 1 << 31 {
-            damage.repeated += 1;
+            // What stands twice is there twice.
+            damage.repeated += u64::from(!matches!(kind, Kind::About | Kind::Parameters));
             return;
         }
         *next = sequence.wrapping_add(1);
@@ -364,7 +406,7 @@ impl Iterator for Entries {
 }
 
 /// A message of a channel of ours.
-struct Numbered {
+pub(super) struct Numbered {
     channel: u16,
     sequence: u32,
     device: usize,
@@ -381,7 +423,14 @@ fn message(content: &[u8], channels: &Channels, ticks: bool) -> Option<Numbered>
     let (_, data) = rest.split_first_chunk::<8>()?;
     let channel = u16::from_le_bytes([c, d]);
     let (device, kind) = channels.of(channel)?;
-    let what = match kind {
+    let what = what(kind, data, ticks);
+    let (sequence, at) = (u32::from_le_bytes(sequence), Stamp(u64::from_le_bytes(at)));
+    Some(Numbered { channel, sequence, device, kind, at, what })
+}
+
+/// A message's content; none if it can't be read.
+fn what(kind: Kind, data: &[u8], ticks: bool) -> Option<What> {
+    match kind {
         Kind::Received => Some(What::Received(data.to_vec())),
         Kind::Sent => Some(What::Sent(data.to_vec())),
         Kind::Tick => Some(What::Tick(if ticks { data.to_vec() } else { Vec::new() })),
@@ -392,9 +441,7 @@ fn message(content: &[u8], channels: &Channels, ticks: bool) -> Option<Numbered>
         Kind::Link => LinkStatus::decode(data).ok().map(What::Link),
         Kind::About => serde_json::from_slice(data).ok().map(|about| What::About(Box::new(about))),
         Kind::Parameters => Setting::from_json(data).map(What::Parameters),
-    };
-    let (sequence, at) = (u32::from_le_bytes(sequence), Stamp(u64::from_le_bytes(at)));
-    Some(Numbered { channel, sequence, device, kind, at, what })
+    }
 }
 
 /// The summary at the end of a file that was finished.

@@ -5,7 +5,8 @@
 //! costs the chunk that it is in. Nothing is allocated for what a length only claims, and what is looked at in vain is
 //! bounded.
 
-use super::{METADATA, seal};
+use super::{metadata_name, seal};
+use ::mcap::Attachment;
 use ::mcap::records::op;
 use ::mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};
 use std::collections::BTreeMap;
@@ -108,7 +109,7 @@ impl fmt::Display for Damage {
             }
         }
         if self.unfinished {
-            tell(f, "it was not finished: the last half a second may be missing".into())?;
+            tell(f, "it was not finished, so that the last half a second may be missing, and other tools may not open it: `blindgrasp recording finish` gives it its end".into())?;
         }
         if separator.is_empty() { write!(f, "nothing") } else { Ok(()) }
     }
@@ -120,6 +121,8 @@ pub(super) enum Piece {
     Header { profile: String, library: String },
     /// Metadata of ours, with its checksum right.
     Metadata(BTreeMap<String, String>),
+    /// An attachment.
+    Attachment(Attachment<'static>),
     /// A chunk begins, and it is whole: [`Pieces::inner`] gives what is in it.
     Chunk,
 }
@@ -240,7 +243,16 @@ impl Pieces {
         let found = match kind {
             op::CHUNK => {
                 if !self.open(length)? {
-                    return Ok(Found::Damage("a chunk is damaged"));
+                    let problem = "a chunk is damaged";
+                    if lengths_agree(&self.packed) == Some(true) {
+                        // It is its content that is damaged, and it ends where it says.
+                        self.damage.add(Place { from: self.trusted, until: end, problem });
+                        (self.trusted, self.at) = (end, end);
+                        return Ok(Found::Nothing);
+                    }
+                    // It may have been unpacked in vain.
+                    self.budget = self.budget.saturating_sub(length.saturating_add(self.unpacked_size()));
+                    return Ok(Found::Damage(problem));
                 }
                 self.trusted = end;
                 Found::Piece(Piece::Chunk)
@@ -266,7 +278,7 @@ impl Pieces {
                 self.ended = true;
                 return Ok(Found::Nothing);
             }
-            op::HEADER | op::METADATA if length <= MOST_OTHER => {
+            op::HEADER | op::METADATA | op::ATTACHMENT if length <= MOST_OTHER => {
                 self.packed.clear();
                 (&mut self.file).take(length).read_to_end(&mut self.packed)?;
                 match description(kind, &self.packed) {
@@ -298,14 +310,18 @@ impl Pieces {
         // Start and end of its times, unpacked size, checksum. One that has no checksum is not believed; one in 2^32
         // chunks of ours has this one.
         let has_checksum = self.packed.get(CRC_AT..CRC_AT + 4).is_some_and(|crc| *crc != [0; 4]);
-        let whole = has_checksum && self.unpack().is_some();
+        let whole = has_checksum && lengths_agree(&self.packed) == Some(true) && self.unpack().is_some();
         if !whole {
             self.opener = opener();
             self.content.clear();
-            // It may have been unpacked in vain to the largest size that there is.
-            self.budget = self.budget.saturating_sub(length + MOST_CHUNK as u64);
         }
         Ok(whole)
+    }
+
+    /// Returns the size that the chunk which was looked at claims to have when unpacked, bytes.
+    fn unpacked_size(&self) -> u64 {
+        let size = self.packed.get(CRC_AT - 8..CRC_AT).and_then(|bytes| bytes.try_into().ok());
+        size.map_or(0, u64::from_le_bytes).min(MOST_CHUNK as u64)
     }
 
     /// The records of the chunk, once its checksum has been found right.
@@ -376,6 +392,15 @@ fn opener() -> LinearReader {
     )
 }
 
+/// Returns `true` if the length of a chunk is what follows from the length of its content; none of what is no chunk.
+fn lengths_agree(chunk: &[u8]) -> Option<bool> {
+    let number = |at: usize| chunk.get(at..at + 8)?.try_into().ok().map(u64::from_le_bytes);
+    let word = chunk.get(PACKED_AT..PACKED_AT + 4)?.try_into().ok().map(u32::from_le_bytes)? as usize;
+    let content_at = PACKED_AT.checked_add(4)?.checked_add(word)?.checked_add(8)?;
+    let content = number(content_at - 8)?;
+    Some(number(1)? == content.checked_add((content_at - HEAD as usize) as u64)?)
+}
+
 /// Returns `true` if these bytes may be the head of a chunk; so many are left in the file.
 fn looks_like_chunk(bytes: &[u8], left: u64) -> bool {
     let number = |at: usize| {
@@ -387,8 +412,11 @@ fn looks_like_chunk(bytes: &[u8], left: u64) -> bool {
         && number(1) <= left - HEAD
 }
 
-/// Reads header and metadata; `None` if they are not what we write.
+/// Reads header, metadata and attachments; `None` if they are not what we write.
 fn description(kind: u8, mut bytes: &[u8]) -> Option<Piece> {
+    if kind == op::ATTACHMENT {
+        return attachment(bytes).map(Piece::Attachment);
+    }
     let first = string(&mut bytes)?.to_owned();
     if kind == op::HEADER {
         return Some(Piece::Header { profile: first, library: string(&mut bytes)?.into() });
@@ -398,8 +426,26 @@ fn description(kind: u8, mut bytes: &[u8]) -> Option<Piece> {
     while !bytes.is_empty() {
         map.insert(string(&mut bytes)?.to_owned(), string(&mut bytes)?.to_owned());
     }
-    let sealed = first == METADATA && map.get("crc") == Some(&seal(&map));
+    let sealed = first == metadata_name(&map) && map.get("crc") == Some(&seal(&map));
     sealed.then_some(Piece::Metadata(map))
+}
+
+fn attachment(bytes: &[u8]) -> Option<Attachment<'static>> {
+    let (all, crc) = bytes.split_last_chunk()?;
+    if crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC).checksum(all) != u32::from_le_bytes(*crc) {
+        return None;
+    }
+    let (log_time, rest) = all.split_first_chunk()?;
+    let (create_time, mut rest) = rest.split_first_chunk()?;
+    let (name, media_type) = (string(&mut rest)?.to_owned(), string(&mut rest)?.to_owned());
+    let (_, data) = rest.split_first_chunk::<8>()?;
+    Some(Attachment {
+        log_time: u64::from_le_bytes(*log_time),
+        create_time: u64::from_le_bytes(*create_time),
+        name,
+        media_type,
+        data: data.to_vec().into(),
+    })
 }
 
 /// Takes a string, which has its length before it, from the beginning.

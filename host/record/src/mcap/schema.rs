@@ -52,7 +52,7 @@ impl FieldKind {
     const fn proto(self) -> Type {
         match self {
             Self::Derived(Derived::Time | Derived::HostTime) => Type::Double,
-            Self::Derived(Derived::LostBefore) => Type::Uint64,
+            Self::Derived(Derived::Session | Derived::LostBefore) => Type::Uint64,
             Self::Derived(Derived::Angle | Derived::Speed) | Self::Told(Kind::Real) => Type::Float,
             Self::Told(Kind::Whole) => Type::Uint32,
             Self::Told(Kind::Count) => Type::Sint32,
@@ -64,7 +64,8 @@ impl FieldKind {
 }
 
 /// The signals of a tick in the order in which they are written: the host's, and then the hand's. Those of a joint are
-/// numbered by themselves. What a limit does has a field for each limit; a host's time has none, since every message has it.
+/// numbered by themselves. What a limit does has a field for each limit; a host's time has none, since every message has it, and
+/// a session is where the channel `about` has a message.
 pub(super) fn tick_signals() -> Vec<TickSignal> {
     let mut signals: Vec<TickSignal> = Vec::new();
     let mut next = [JOINTS + 1, 1];
@@ -73,7 +74,8 @@ pub(super) fn tick_signals() -> Vec<TickSignal> {
         signals.push(TickSignal { number: *next, name, each, kind, unit, words });
         *next += 1;
     };
-    for &derived in Derived::ALL.iter().filter(|&&derived| derived != Derived::HostTime) {
+    let is_told = |derived: &&Derived| !matches!(derived, Derived::HostTime | Derived::Session);
+    for &derived in Derived::ALL.iter().filter(is_told) {
         let kind = FieldKind::Derived(derived);
         add(derived.key().into(), derived.each(), kind, derived.unit(), derived.words());
     }
@@ -200,14 +202,33 @@ pub(super) fn of_hand(hand: &str, joint_names: &[String]) -> (String, Vec<u8>) {
     (format!("{package}.Tick"), FileDescriptorSet { file: vec![file] }.encode_to_vec())
 }
 
+/// Name, encoding and bytes of the schema of a channel that is the same for every hand; none of what has none.
+pub(super) fn of_kind(channel: super::Kind) -> Option<(String, &'static str, Vec<u8>)> {
+    use super::Kind;
+    let json = |schema: Value| schema.to_string().into_bytes();
+    let (name, encoding, data) = match channel {
+        Kind::Received | Kind::Sent | Kind::Tick => return None,
+        Kind::Event => (LOG, "protobuf", of_log()),
+        Kind::Link => (LINK, "protobuf", of_link()),
+        Kind::About => ("blindgrasp.About", "jsonschema", json(of_about())),
+        Kind::Parameters => ("blindgrasp.Parameters", "jsonschema", json(of_parameters())),
+    };
+    Some((name.to_owned(), encoding, data))
+}
+
+/// Returns the encoding of a schema's messages.
+pub(super) fn encoding(of_schema: &str) -> &'static str {
+    if of_schema == "jsonschema" { "json" } else { "protobuf" }
+}
+
 /// The schema of the link's state.
-pub(super) fn of_link() -> Vec<u8> {
+fn of_link() -> Vec<u8> {
     let file = file("blindgrasp", vec![message("Link", fields(link::ALL))]);
     FileDescriptorSet { file: vec![file] }.encode_to_vec()
 }
 
 /// The schema of events, which viewers know.
-pub(super) fn of_log() -> Vec<u8> {
+fn of_log() -> Vec<u8> {
     let levels = ["UNKNOWN", "DEBUG", "INFO", "WARNING", "ERROR", "FATAL"];
     let log = DescriptorProto {
         enum_type: vec![enumeration("Level", levels.iter().map(|&name| name.to_owned()).zip(0..))],
@@ -232,7 +253,7 @@ pub(super) fn of_log() -> Vec<u8> {
 }
 
 /// JSON schema of what a device is.
-pub(super) fn of_about() -> Value {
+fn of_about() -> Value {
     let text = |words: &str| json!({ "type": "string", "description": words });
     let maybe = |words: &str| json!({ "type": ["string", "null"], "description": words });
     let number = |words: &str| json!({ "type": "integer", "description": words });
@@ -266,7 +287,7 @@ pub(super) fn of_about() -> Value {
 }
 
 /// JSON schema of parameters.
-pub(super) fn of_parameters() -> Value {
+fn of_parameters() -> Value {
     json!({
         "title": "blindgrasp.Parameters",
         "type": "object",

@@ -9,9 +9,12 @@ use super::decoder::{Arrival, Decoded, Track};
 use super::error::RecordingError;
 use super::file::WholeFile;
 use super::message::{Level, LinkStatus, Log, write_tick};
-use super::{CHANNELS, Device, FORMAT, Kind, LIBRARY, METADATA, PROFILE, SIGNALS, Stamp, schema, seal};
+use super::{
+    CHANNELS, Device, FORMAT, Kind, LIBRARY, PROFILE, SIGNALS, Stamp, metadata_name, schema, seal, twin,
+};
 use ::mcap::records::{MessageHeader, Metadata};
 use ::mcap::{Attachment, Compression, WriteOptions};
+use blindgrasp_files::NewFile;
 use blindgrasp_shared::command::Answer;
 use blindgrasp_shared::fault::Raised;
 use blindgrasp_shared::link::most_bytes;
@@ -49,15 +52,23 @@ impl fmt::Display for Saved {
     }
 }
 
+/// The moment from which the file has its name.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Named {
+    AtTheFirstEntry,
+    WhenFinished,
+}
+
 /// A failure that is final.
 struct Failure {
     problem: String,
 }
 
-/// Writes a recording. One that is dropped is finished, as well as that can be done.
+/// Writes a recording. One that is dropped and has its name is finished, as well as that can be done; another is removed.
 pub struct Writer {
     path: PathBuf,
     file: WholeFile,
+    named: Named,
     /// Taken at the end.
     mcap: Option<::mcap::Writer<Gathered>>,
     gathered: Gathered,
@@ -98,15 +109,25 @@ struct Recorded {
 }
 
 impl Writer {
-    /// Makes the file. It is a whole, empty recording then.
+    /// Begins a recording of what can't be done again. Its file has its name from the first checkpoint on that has an entry in
+    /// it; what had that name before, which `force` allows, stays until then.
     ///
     /// # Errors
     /// The file is there already, without `force`, or can't be written.
     pub fn create(path: &Path, force: bool) -> Result<Self, RecordingError> {
-        let file = WholeFile::create(path, force).map_err(|source| match source.kind() {
-            io::ErrorKind::AlreadyExists => RecordingError::Exists { path: path.into() },
-            _ => RecordingError::Io { action: "create", path: path.into(), source },
-        })?;
+        Self::new(path, force, Named::AtTheFirstEntry)
+    }
+
+    /// Begins a recording whose file has its name once it is finished.
+    ///
+    /// # Errors
+    /// As [`Self::create`].
+    pub fn create_whole(path: &Path, force: bool) -> Result<Self, RecordingError> {
+        Self::new(path, force, Named::WhenFinished)
+    }
+
+    fn new(path: &Path, force: bool, named: Named) -> Result<Self, RecordingError> {
+        let file = WholeFile::new(NewFile::create(path, force)?);
         let gathered = Gathered::default();
         let mcap = WriteOptions::new()
             .compression(Some(Compression::Lz4))
@@ -120,6 +141,7 @@ impl Writer {
         let mut writer = Self {
             path: path.into(),
             file,
+            named,
             mcap: Some(mcap),
             gathered,
             devices: Vec::new(),
@@ -140,17 +162,14 @@ impl Writer {
 
     /// Writes the records that make the file describe itself.
     fn preamble(&mut self) -> Result<(), RecordingError> {
-        let mut metadata = BTreeMap::from([
+        let metadata = BTreeMap::from([
             ("format".to_owned(), FORMAT.to_string()),
             ("interface_version".to_owned(), INTERFACE_VERSION.to_string()),
             ("host_version".to_owned(), env!("CARGO_PKG_VERSION").to_owned()),
         ]);
-        let seal = seal(&metadata);
-        metadata.insert("crc".into(), seal);
         let signals = serde_json::to_vec_pretty(&schema::signal_table()).unwrap_or_default();
-        let mcap = self.mcap()?;
-        mcap.write_metadata(&Metadata { name: METADATA.into(), metadata })?;
-        mcap.attach(&Attachment {
+        self.describe(metadata)?;
+        self.mcap()?.attach(&Attachment {
             log_time: 0,
             create_time: 0,
             name: SIGNALS.into(),
@@ -184,8 +203,8 @@ impl Writer {
     /// # Errors
     /// The recording has stopped.
     pub fn about(&mut self, device: Device, at: Stamp, about: &About) -> Result<(), RecordingError> {
-        let json = serde_json::to_vec(about).unwrap_or_default();
-        self.write(device, Kind::About, at, &json)?;
+        let json = serde_json::to_string(about).unwrap_or_default();
+        self.write_twice(device, Kind::About, at, json)?;
         let joint_names: Vec<String> = (0..about.joints())
             .map(|k| about.joint_names.get(k).cloned().unwrap_or_else(|| format!("joint{}", k + 1)))
             .collect();
@@ -196,7 +215,7 @@ impl Writer {
         recorded.joint_names = joint_names;
         recorded.tick_channel = Some(channel);
         recorded.baud = about.baud;
-        (recorded.mode, recorded.fault, recorded.dropped) = (None, None, None);
+        (recorded.mode, recorded.fault) = (None, None);
         let words = format!(
             "session: blindgrasp {} ({:08x}), image `{}` for the hand `{}` ({:08x}), interface {}{}",
             about.firmware_version,
@@ -224,8 +243,7 @@ impl Writer {
         at: Stamp,
         values: &[Setting],
     ) -> Result<(), RecordingError> {
-        let json = Setting::to_json(values).to_string();
-        self.write(device, Kind::Parameters, at, json.as_bytes())?;
+        self.write_twice(device, Kind::Parameters, at, Setting::to_json(values).to_string())?;
         self.devices[device.0].track.parameters(values);
         self.settle(at)
     }
@@ -273,9 +291,10 @@ impl Writer {
         let record = &decoded.record;
         recorded.status.records += 1;
         recorded.status.missing += decoded.lost_before;
-        // A counter that is smaller than before is another session's.
         let before = recorded.dropped.replace(record.dropped).unwrap_or(record.dropped);
-        recorded.status.dropped += u64::from(record.dropped.saturating_sub(before));
+        // A counter that is smaller than before has started anew with its device.
+        let dropped = record.dropped.checked_sub(before).unwrap_or(record.dropped);
+        recorded.status.dropped += u64::from(dropped);
         recorded.decimation = decoded.decimation();
         if let Some(channel) = recorded.tick_channel {
             let mut buffer = std::mem::take(&mut self.buffer);
@@ -345,7 +364,7 @@ impl Writer {
     pub fn gap(&mut self, device: Device, at: Stamp, words: &str) -> Result<(), RecordingError> {
         let recorded = &mut self.devices[device.0];
         recorded.track.restart();
-        (recorded.mode, recorded.fault, recorded.dropped) = (None, None, None);
+        (recorded.mode, recorded.fault) = (None, None);
         self.log(device, at, Level::Warning, GAP, words)?;
         self.settle(at)
     }
@@ -384,13 +403,21 @@ impl Writer {
             let added = self.file.add(&mut bytes);
             self.gathered.give_back(bytes);
             added.map_err(|error| self.stop(&error))?;
+            if self.named == Named::AtTheFirstEntry && self.span.is_some() {
+                self.publish()?;
+            }
             self.saved = self.reached();
         }
         (self.pending, self.since) = (0, None);
         Ok(())
     }
 
-    /// Returns the contents of the file.
+    /// Returns `true` if nothing was recorded so far.
+    pub fn is_empty(&self) -> bool {
+        self.span.is_none()
+    }
+
+    /// Returns the contents of the file; of one that has no name yet, nothing.
     pub fn saved(&self) -> Saved {
         self.saved
     }
@@ -410,14 +437,26 @@ impl Writer {
         mcap.finish()?;
         let bytes = self.gathered.take();
         self.file.end(&bytes).and_then(|()| self.file.sync()).map_err(|error| self.stop(&error))?;
+        self.publish()?;
         self.saved = self.reached();
+        Ok(())
+    }
+
+    fn publish(&mut self) -> Result<(), RecordingError> {
+        if self.file.is_published() {
+            return Ok(());
+        }
+        self.file.publish().inspect_err(|error| {
+            self.failure = Some(Failure { problem: error.to_string() });
+        })?;
         Ok(())
     }
 
     /// Returns the contents of the file, if all that was gathered is in it.
     fn reached(&self) -> Saved {
         let seconds = self.span.map_or(0.0, |(first, last)| last.0.saturating_sub(first.0) as f64 / 1e9);
-        Saved { bytes: self.file.length(), records: self.records, seconds }
+        let bytes = if self.file.is_published() { self.file.length() } else { 0 };
+        Saved { bytes, records: self.records, seconds }
     }
 
     fn stop(&mut self, error: &io::Error) -> RecordingError {
@@ -454,6 +493,33 @@ impl Writer {
         let log =
             Log { timestamp: Some(timestamp), level: level.into(), message: words.into(), name: name.into() };
         self.write(device, Kind::Event, at, &log.encode_to_vec())
+    }
+
+    /// Adds metadata, with its checksum.
+    fn describe(&mut self, mut metadata: BTreeMap<String, String>) -> Result<(), RecordingError> {
+        let seal = seal(&metadata);
+        metadata.insert("crc".into(), seal);
+        let name = metadata_name(&metadata);
+        Ok(self.mcap()?.write_metadata(&Metadata { name, metadata })?)
+    }
+
+    /// Adds a message that everything after it hangs on: also as metadata, which ends the chunk before.
+    fn write_twice(
+        &mut self,
+        device: Device,
+        kind: Kind,
+        at: Stamp,
+        json: String,
+    ) -> Result<(), RecordingError> {
+        let channel = kind.channel(device);
+        self.describe(BTreeMap::from([
+            (twin::DEVICE.to_owned(), self.devices[device.0].name.clone()),
+            (twin::CHANNEL.to_owned(), channel.to_string()),
+            (twin::SEQUENCE.to_owned(), self.counts.get(&channel).copied().unwrap_or(0).to_string()),
+            (twin::TIME_NS.to_owned(), at.0.to_string()),
+            (twin::JSON.to_owned(), json.clone()),
+        ]))?;
+        self.write(device, kind, at, json.as_bytes())
     }
 
     /// Adds a message to one of a device's own channels.
@@ -494,22 +560,12 @@ impl Writer {
             }
             let name = self.devices[k].name.clone();
             let mcap = self.mcap()?;
-            for kind in CHANNELS {
-                let (schema, encoding) = match kind {
-                    Kind::Received | Kind::Sent => (0, PROFILE),
-                    Kind::Event => (mcap.add_schema(schema::LOG, "protobuf", &schema::of_log())?, "protobuf"),
-                    Kind::Link => {
-                        (mcap.add_schema(schema::LINK, "protobuf", &schema::of_link())?, "protobuf")
+            for kind in CHANNELS.into_iter().filter(|&kind| kind != Kind::Tick) {
+                let (schema, encoding) = match schema::of_kind(kind) {
+                    None => (0, PROFILE),
+                    Some((name, encoding, data)) => {
+                        (mcap.add_schema(&name, encoding, &data)?, schema::encoding(encoding))
                     }
-                    Kind::About => {
-                        let schema = schema::of_about().to_string();
-                        (mcap.add_schema("blindgrasp.About", "jsonschema", schema.as_bytes())?, "json")
-                    }
-                    Kind::Parameters => {
-                        let schema = schema::of_parameters().to_string();
-                        (mcap.add_schema("blindgrasp.Parameters", "jsonschema", schema.as_bytes())?, "json")
-                    }
-                    Kind::Tick => continue,
                 };
                 let topic = kind.topic(&name);
                 mcap.add_channel_with_id(
@@ -567,8 +623,8 @@ pub(super) const GAP: &str = "gap";
 
 impl Drop for Writer {
     fn drop(&mut self) {
-        if self.failure.is_none() {
-            // Whoever wants to know calls `finish`.
+        // Whoever wants to know calls `finish`. What is not to be seen before its end is not finished by chance.
+        if self.failure.is_none() && self.file.is_published() {
             let _ = self.end();
         }
     }

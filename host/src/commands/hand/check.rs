@@ -1,12 +1,14 @@
 //! `blindgrasp hand check`: what a hand is, whether it can be used, and what is wrong with it.
 
 use super::super::Outcome;
+use crate::terminal;
 use anyhow::Context;
+use blindgrasp::files;
 use blindgrasp::model::inspect::finding::Verdict;
 use blindgrasp::model::inspect::hand::{HandCheck, NominalHand};
 use blindgrasp::view;
 use clap::Args;
-use std::io::{self, Write as _};
+use std::ffi::OsString;
 use std::path::PathBuf;
 
 /// Show what a hand is (tree, joints, reach, masses, forces) and find what is wrong with it
@@ -18,7 +20,7 @@ use std::path::PathBuf;
 #[derive(Args)]
 pub(crate) struct Arguments {
     /// A built-in hand or the path of a hand's file
-    file: String,
+    file: OsString,
     /// Print everything as one JSON object
     #[arg(long)]
     json: bool,
@@ -31,12 +33,12 @@ pub(crate) struct Arguments {
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
     let check = HandCheck::load(&arguments.file)?;
     let text = if arguments.json { serde_json::to_string(&check)? + "\n" } else { check.text() };
-    io::stdout().lock().write_all(text.as_bytes()).context("cannot print the findings")?;
+    terminal::print(&text).context("cannot print the findings")?;
     if let Some(path) = &arguments.picture {
         match &check.nominal {
             Some(NominalHand { hand, joint_names, angles_rad }) => {
                 let svg = view::hand_svg(&check.name, hand, joint_names, angles_rad);
-                std::fs::write(path, svg).with_context(|| format!("cannot write {}", path.display()))?;
+                files::write(path, svg, true)?;
                 eprintln!("blindgrasp: wrote {}", path.display());
             }
             None => {

@@ -1,11 +1,13 @@
 //! `blindgrasp hand export`: a hand in a format of other tools.
 
 use super::super::Outcome;
-use super::super::output::write_new;
+use crate::terminal;
 use anyhow::Context;
+use blindgrasp::files;
 use blindgrasp::model::HandFile;
 use clap::Args;
-use std::io::{self, Write};
+use std::ffi::OsString;
+use std::io::Write;
 use std::path::PathBuf;
 
 /// Write a hand as a URDF that other tools load
@@ -15,7 +17,7 @@ use std::path::PathBuf;
 #[derive(Args)]
 pub(crate) struct Arguments {
     /// A built-in hand, or the path of a hand's file
-    hand: String,
+    hand: OsString,
     /// The format: URDF (there is no other yet)
     #[arg(long, required = true)]
     urdf: bool,
@@ -35,9 +37,9 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
     }
     let text = file.to_urdf();
     match &arguments.out {
-        None => io::stdout().lock().write_all(text.as_bytes()).context("cannot print the URDF")?,
+        None => terminal::document().write_all(text.as_bytes()).context("cannot print the URDF")?,
         Some(path) => {
-            write_new(path, &text, arguments.force)?;
+            files::write(path, &text, arguments.force)?;
             eprintln!("blindgrasp: wrote {}", path.display());
         }
     }

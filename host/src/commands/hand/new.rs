@@ -1,8 +1,8 @@
 //! `blindgrasp hand new`: a hand's file for a URDF.
 
 use super::super::Outcome;
-use super::super::output::write_new;
-use anyhow::{Context, bail};
+use anyhow::Context;
+use blindgrasp::files;
 use blindgrasp::model::{FingertipRequest, StarterRequest};
 use clap::Args;
 use std::path::{Component, Path, PathBuf};
@@ -37,9 +37,7 @@ pub(crate) struct Arguments {
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
     let urdf = &arguments.urdf;
     let out = arguments.out.clone().unwrap_or_else(|| urdf.with_extension("toml"));
-    if out.exists() && !arguments.force {
-        bail!("{}: is there already; choose another with --out, or overwrite it with --force", out.display());
-    }
+    files::check(&out, arguments.force)?;
     let folder = out.parent().map(Path::to_path_buf).unwrap_or_default();
     let file = relative(urdf, &folder)
         .to_str()
@@ -56,7 +54,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
     for warning in &starter.warnings {
         eprintln!("blindgrasp: warning: {warning}");
     }
-    write_new(&out, &starter.text, arguments.force)?;
+    files::write(&out, &starter.text, arguments.force)?;
     for guess in &starter.guesses {
         eprintln!("blindgrasp: guessed: {guess}");
     }

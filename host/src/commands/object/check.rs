@@ -1,13 +1,15 @@
 //! `blindgrasp object check`: what an object is, whether it can be used, and what is wrong with it.
 
 use super::super::Outcome;
+use crate::terminal;
 use anyhow::Context;
+use blindgrasp::files;
 use blindgrasp::model::inspect::finding::Verdict;
 use blindgrasp::model::inspect::object::{ObjectCheck, Wanted};
 use blindgrasp::model::mesh::Unit;
 use blindgrasp::view;
 use clap::Args;
-use std::io::{self, Write as _};
+use std::ffi::OsString;
 use std::path::PathBuf;
 
 /// Show what an object is (volume, mass, faces with the room on them) and find what is wrong with it
@@ -19,7 +21,7 @@ use std::path::PathBuf;
 #[derive(Args)]
 pub(crate) struct Arguments {
     /// A built-in object, the path of an object's file, or a mesh (.stl, .obj) with its --unit
-    file: String,
+    file: OsString,
     /// The unit of a mesh: mm, cm, m or in
     #[arg(long, value_parser = super::unit)]
     unit: Option<Unit>,
@@ -43,12 +45,12 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
         Wanted { unit: arguments.unit, fingertip_m: arguments.fingertip.map(|radius| radius * 1e-3) };
     let check = ObjectCheck::load(&arguments.file, &wanted)?;
     let text = if arguments.json { serde_json::to_string(&check)? + "\n" } else { check.text() };
-    io::stdout().lock().write_all(text.as_bytes()).context("cannot print the findings")?;
+    terminal::print(&text).context("cannot print the findings")?;
     if let Some(path) = &arguments.picture {
         match &check.shape {
             Some(shape) => {
                 let svg = view::object_svg(shape, &check.name);
-                std::fs::write(path, svg).with_context(|| format!("cannot write {}", path.display()))?;
+                files::write(path, svg, true)?;
                 eprintln!("blindgrasp: wrote {}", path.display());
             }
             None => eprintln!("blindgrasp: no picture: it is not a body; correct the errors first"),

@@ -2,11 +2,13 @@
 
 use super::super::Outcome;
 use anyhow::{Context, bail};
+use blindgrasp::files;
 use blindgrasp::model::ObjectFile;
 use blindgrasp::model::inspect::finding::{Severity, Verdict};
 use blindgrasp::model::inspect::object::{ObjectCheck, Wanted};
 use blindgrasp::model::mesh::{Unit, is_mesh};
 use clap::Args;
+use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 
 /// Make an object's file that refers to a mesh (.stl, .obj), after checking the mesh
@@ -15,7 +17,7 @@ use std::path::{Path, PathBuf};
 #[derive(Args)]
 pub(crate) struct Arguments {
     /// The mesh
-    mesh: String,
+    mesh: OsString,
     /// Its unit: mm, cm, m or in
     #[arg(long, value_parser = super::unit)]
     unit: Option<Unit>,
@@ -56,15 +58,13 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
         return Ok(Outcome::Failed);
     }
     let out = arguments.out.clone().unwrap_or_else(|| mesh.with_extension("toml"));
-    if out.exists() && !arguments.force {
-        bail!("{}: is there already; name another with --out, or overwrite it with --force", out.display());
-    }
+    files::check(&out, arguments.force)?;
     let text = describe(arguments, &relative(mesh, &out)?, &check);
     // What can't be read back is not written.
     let folder = out.parent().unwrap_or(Path::new(""));
     let file = ObjectFile::parse(&text, &out.to_string_lossy(), folder)?;
     file.body(&mut Vec::new()).map_err(|error| anyhow::anyhow!("{error}"))?;
-    std::fs::write(&out, &text).with_context(|| format!("{}: cannot be written", out.display()))?;
+    files::write(&out, &text, arguments.force)?;
     let warnings = check.findings.iter().filter(|finding| finding.severity == Severity::Warning).count();
     eprintln!("blindgrasp: wrote {}{}", out.display(), if warnings > 0 { ", with warnings" } else { "" });
     Ok(Outcome::Shown)

@@ -1,14 +1,16 @@
 //! `blindgrasp scene new`: where the fingertips of a hand touch an object, and a scene file that begins there.
 
 use super::show;
-use crate::commands::{Outcome, output};
+use crate::commands::Outcome;
+use crate::terminal;
 use anyhow::{Context, bail};
+use blindgrasp::files;
 use blindgrasp::model::file::{ContactFile, SceneFile};
 use blindgrasp::model::{HandFile, ObjectFile, Parts, suggestion};
 use blindgrasp::place::{NoPlacement, Reach, Request, place, scene_text, template};
 use clap::Args;
 use std::collections::BTreeMap;
-use std::io::{self, Write as _};
+use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 
 /// The most placements that can be listed.
@@ -23,9 +25,9 @@ const LONGEST_LIST: usize = 100;
 #[derive(Args)]
 pub(crate) struct Arguments {
     /// A built-in hand, or the path of a hand's file
-    hand: String,
+    hand: OsString,
     /// A built-in object, or the path of an object's file
-    object: String,
+    object: OsString,
     /// The file to write; without it HAND-OBJECT.toml here
     #[arg(long, value_name = "FILE.toml")]
     out: Option<PathBuf>,
@@ -71,12 +73,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
         .out
         .clone()
         .unwrap_or_else(|| PathBuf::from(format!("{}.toml", like.name.replace(['/', '\\'], "-"))));
-    if !arguments.force && path.exists() {
-        bail!(
-            "{}: is there already; choose another with --out, or overwrite it with --force",
-            path.display()
-        );
-    }
+    files::check(&path, arguments.force)?;
     let parts = Parts::of(&like)?;
     let reach = Reach::of_scene(&like, &parts)?;
     let request = Request {
@@ -101,14 +98,14 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
     let [hand, object] = references;
     let text = scene_text(&placements[0], &hand?, &object?);
     let shown = if arguments.json { show::json(&placements, &path)? } else { show::text(&placements) };
-    output::write_new(&path, &text, arguments.force)?;
+    files::write(&path, &text, arguments.force)?;
     print(&shown)?;
     eprintln!("blindgrasp: wrote {}; `blindgrasp sim {}` runs it", path.display(), shown_path(&path));
     Ok(Outcome::Shown)
 }
 
 fn print(text: &str) -> anyhow::Result<()> {
-    io::stdout().lock().write_all(text.as_bytes()).context("cannot print the placement")
+    terminal::print(text).context("cannot print the placement")
 }
 
 /// Returns a path as `sim` takes it, to which a name without a separator or `.toml` is a built-in one.
@@ -190,15 +187,16 @@ fn trunk(settings: &[String]) -> anyhow::Result<BTreeMap<String, f64>> {
 }
 
 /// Returns the scene's name for a hand or an object: a built-in name, or a path relative to the scene's file.
-fn reference(name: &str, scene: &Path) -> anyhow::Result<String> {
+fn reference(path: &OsString, scene: &Path) -> anyhow::Result<String> {
+    let name = path.to_string_lossy();
     if !name.ends_with(".toml") && !name.contains(['/', '\\']) {
-        return Ok(name.to_owned());
+        return Ok(name.into_owned());
     }
     let folder = match scene.parent() {
         Some(folder) if folder != Path::new("") => folder.to_owned(),
         _ => PathBuf::from("."),
     };
-    let [target, folder] = [Path::new(name), &folder]
+    let [target, folder] = [Path::new(path), &folder]
         .map(|path| path.canonicalize().with_context(|| path.display().to_string()));
     let (target, folder) = (target?, folder?);
     // Between two drives there is no relative path.

@@ -23,6 +23,7 @@ use blindgrasp_body::{Hand, MAX_JOINTS};
 use found::Found;
 use serde::Serialize;
 use specimen::Specimen;
+use std::ffi::OsStr;
 
 pub use facts::{FingertipFacts, JointFacts, Masses, MeetingFacts, MeetingsFacts, Reach};
 
@@ -70,7 +71,7 @@ impl HandCheck {
     ///
     /// # Errors
     /// What keeps the file from being read at all: it is not there, no TOML, or a key is unknown, missing or of another type.
-    pub fn load(name_or_path: &str) -> Result<Self, SceneError> {
+    pub fn load(name_or_path: impl AsRef<OsStr>) -> Result<Self, SceneError> {
         let (file, places) = HandFile::load_with_places(name_or_path)?;
         Ok(Self::of(file, &places))
     }

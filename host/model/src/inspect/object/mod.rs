@@ -16,6 +16,7 @@ use boxes::Boxes;
 use crossing::crossings;
 use nalgebra::{SymmetricEigen, Vector3};
 use serde::Serialize;
+use std::ffi::OsStr;
 
 /// Larger and smaller bodies are likely given in another unit, m.
 const USUAL_M: [f64; 2] = [2e-3, 2.0];
@@ -117,9 +118,10 @@ impl ObjectCheck {
     /// # Errors
     /// What keeps the file from being read at all: it is not there, no TOML, a key is unknown, missing or of another type, or
     /// a mesh file's unit is not given. That its triangles enclose no body is a finding.
-    pub fn load(name_or_path: &str, wanted: &Wanted) -> Result<Self, SceneError> {
+    pub fn load(name_or_path: impl AsRef<OsStr>, wanted: &Wanted) -> Result<Self, SceneError> {
+        let name_or_path = name_or_path.as_ref();
         let is_mesh = mesh::is_mesh(name_or_path);
-        let whole = Place::whole(name_or_path);
+        let whole = Place::of_path(name_or_path);
         let loaded = if is_mesh {
             mesh::load(name_or_path, wanted.unit).map(|(shape, notices)| Self {
                 name: stem(name_or_path),
@@ -223,10 +225,8 @@ fn bare(shape: ShapeFile) -> ObjectFile {
     }
 }
 
-fn stem(path: &str) -> String {
-    std::path::Path::new(path)
-        .file_stem()
-        .map_or_else(|| path.to_owned(), |stem| stem.to_string_lossy().into_owned())
+fn stem(path: &OsStr) -> String {
+    std::path::Path::new(path).file_stem().unwrap_or(path).to_string_lossy().into_owned()
 }
 
 fn face_facts(shape: &Polyhedron) -> Vec<FaceFacts> {
