@@ -25,18 +25,19 @@ impl Default for Thinned {
 impl Thinned {
     /// Takes the next sample.
     pub fn see(&mut self, sample: &Sample) {
-        if self.samples.len() == MOST {
-            self.stride *= 2;
-            let mut is_kept = false;
-            self.samples.retain(|_| {
-                is_kept = !is_kept;
-                is_kept
-            });
-        }
-        let is_kept = self.seen.is_multiple_of(self.stride);
-        self.last = (!is_kept).then(|| sample.clone());
-        if is_kept {
+        if self.seen.is_multiple_of(self.stride) {
+            if self.samples.len() == MOST {
+                self.stride *= 2;
+                let mut is_kept = false;
+                self.samples.retain(|_| {
+                    is_kept = !is_kept;
+                    is_kept
+                });
+            }
             self.samples.push(sample.clone());
+            self.last = None;
+        } else {
+            self.last = Some(sample.clone());
         }
         self.seen += 1;
     }
@@ -56,7 +57,7 @@ mod tests {
 
     #[test]
     fn a_long_run_keeps_one_in_so_many_and_its_ends() {
-        let scene = Scene::load("prism", &["duration_s=0".to_owned()]).unwrap();
+        let scene = Scene::load("prism", &["duration_s=0.001".to_owned()]).unwrap();
         let first = Simulation::new(&scene).unwrap().run().samples.remove(0);
         for (count, stride) in [(1, 1), (MOST, 1), (MOST + 1, 2), (2 * MOST, 2), (5 * MOST + 7, 8)] {
             let mut thinned = Thinned::default();
@@ -68,7 +69,7 @@ mod tests {
             if !(count - 1).is_multiple_of(stride) {
                 expected.push((count - 1) as f64);
             }
-            assert_eq!(times, expected, "{count}");
+            assert!(times == expected, "{count}");
         }
     }
 }
