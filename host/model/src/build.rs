@@ -2,9 +2,9 @@
 
 use super::{
     Parts, Scene,
-    check::{Result, all_within, fail, item, name, schema, within},
+    check::{Refused, Result, all_within, fail, item, name, schema, within},
     file::{Control, PushFile, SceneFile},
-    hand::{fingertip_parameters, hand, joint_parameters, moving_masses, overlaps},
+    hand::{fingertip_parameters, joint_parameters, overlaps, still_joints},
     object::object,
     start::start,
 };
@@ -19,15 +19,12 @@ const LONGEST_DELAY_TICKS: u32 = 1000;
 /// Checks what is known before hand and object meet.
 pub(super) fn parts(file: &SceneFile) -> Result<Parts> {
     let mut warnings = Vec::new();
-    for (key, word) in
-        [("name", &file.name), ("hand.name", &file.hand.name), ("object.name", &file.object.name)]
-    {
-        name(key, word)?;
-    }
+    name("name", &file.name)?;
     let substeps = settings(file)?;
     late_pushes(file, &mut warnings);
-    let hand = hand(&file.hand, &mut warnings)?;
-    let object = object(&file.object, &mut warnings)?;
+    // The gains of the scene are what acts; those of the hand say which firmware is its own.
+    let hand = file.hand.prepare(&mut warnings).map_err(|error| error.below("hand"))?;
+    let object = object(&file.object, &mut warnings).map_err(|error| error.below("object"))?;
     Ok(Parts { hand, object, substeps, warnings })
 }
 
@@ -47,7 +44,10 @@ pub(super) fn scene(file: SceneFile) -> Result<Scene> {
         );
     }
     let (contacts, start) = start(&file, &hand, &object.shape, position_m, attitude)?;
-    moving_masses(&file.hand, &hand, &start.angles_rad)?;
+    if let Some(&k) = still_joints(&hand, &start.angles_rad).first() {
+        let problem = format!("joint `{}` moves no mass", file.hand.joints[k].name);
+        return fail(item("hand.joint", k, "mass_kg"), problem, "give its link a mass and an inertia");
+    }
     overlaps(&file.hand, &hand, &start.angles_rad, &mut warnings);
 
     Ok(Scene {
@@ -78,17 +78,10 @@ pub(super) fn scene(file: SceneFile) -> Result<Scene> {
 /// Everything that is a plain number. Returns the number of sub-steps in a control period.
 fn settings(file: &SceneFile) -> Result<usize> {
     schema("schema", file.schema)?;
-    schema("hand.schema", file.hand.schema)?;
-    schema("object.schema", file.object.schema)?;
-    // Those of the scene are what acts; those of the hand say which firmware is its own.
-    if let Some(gains) = &file.hand.control {
-        control(gains).map_err(|mut error| {
-            error.key = format!("hand.{}", error.key);
-            error
-        })?;
-    }
     let control = &file.control;
-    self::control(control)?;
+    let mut refused = Refused::default();
+    self::control(control, &mut refused);
+    refused.or(Some(()))?;
     within("duration_s", file.duration_s, control.period_s, LONGEST_RUN_S)?;
     within("sensors.noise_counts", file.sensors.noise_counts, 0.0, 1e6)?;
     if file.actuators.output_delay_ticks > LONGEST_DELAY_TICKS {
@@ -143,30 +136,30 @@ fn late_pushes(file: &SceneFile, warnings: &mut Vec<String>) {
     }));
 }
 
-/// The gains, of a scene or of a hand.
-pub(super) fn control(control: &Control) -> Result<()> {
-    within("control.period_s", control.period_s, 1e-4, 0.1)?;
-    let microseconds = control.period_s * 1e6;
-    if (microseconds - microseconds.round()).abs() > 1e-6 {
-        return fail(
-            "control.period_s",
-            format!("{:?} s is not a whole number of microseconds", control.period_s),
-            format!("{:?} is", microseconds.round() * 1e-6),
-        );
-    }
-    for (gain, &value) in GAINS.iter().zip(control.gains.iter()) {
+/// Checks the gains, of a scene or of a hand.
+pub(super) fn control(control: &Control, refused: &mut Refused) {
+    let period = |period_s: f64| {
+        within("control.period_s", period_s, 1e-4, 0.1)?;
+        let microseconds = period_s * 1e6;
+        if (microseconds - microseconds.round()).abs() > 1e-6 {
+            let problem = format!("{period_s:?} s is not a whole number of microseconds");
+            return fail("control.period_s", problem, format!("{:?} is", microseconds.round() * 1e-6));
+        }
+        Ok(())
+    };
+    refused.take(period(control.period_s));
+    refused.take_all(GAINS.iter().zip(control.gains.iter()).map(|(gain, &value)| {
         let least = if gain.may_be_zero { 0.0 } else { 1e-6 };
-        within(&format!("control.{}", gain.key), value, least, 1e4)?;
-    }
-    within("control.damping_scale", control.damping_scale, 0.0, 1e4)?;
-    within("control.soft_start_s", control.soft_start_s, 0.0, LONGEST_RUN_S)?;
-    within("control.amplifier_start_ms", control.amplifier_start_ms.into(), 0.0, LONGEST_RUN_S * 1e3)?;
+        within(&format!("control.{}", gain.key), value, least, 1e4)
+    }));
     // The tick's own bounds, so that the file and the key are named here.
     let fastest_hz = 1.0 / (std::f64::consts::PI * control.period_s);
-    within(
-        "control.estimator_bandwidth_hz",
-        control.estimator_bandwidth_hz,
-        1e-3 * fastest_hz,
-        0.999 * fastest_hz,
-    )
+    for (key, value, least, most) in [
+        ("damping_scale", control.damping_scale, 0.0, 1e4),
+        ("soft_start_s", control.soft_start_s, 0.0, LONGEST_RUN_S),
+        ("amplifier_start_ms", control.amplifier_start_ms.into(), 0.0, LONGEST_RUN_S * 1e3),
+        ("estimator_bandwidth_hz", control.estimator_bandwidth_hz, 1e-3 * fastest_hz, 0.999 * fastest_hz),
+    ] {
+        refused.take(within(&format!("control.{key}"), value, least, most));
+    }
 }

@@ -9,6 +9,57 @@ pub(super) type Result<T> = std::result::Result<T, SceneError>;
 /// Bytes of a name.
 pub(super) const LONGEST_NAME: usize = 100;
 
+/// The errors of a file, in the order in which they were found: a loader refuses the file for the first, a check tells them
+/// all.
+#[derive(Debug, Default)]
+pub(crate) struct Refused(Vec<SceneError>);
+
+impl Refused {
+    /// Adds the error of a check that failed; of one that did not, returns the value.
+    pub(super) fn take<T>(&mut self, checked: Result<T>) -> Option<T> {
+        checked.map_err(|error| self.0.push(error)).ok()
+    }
+
+    /// Adds the errors of several checks.
+    pub(super) fn take_all(&mut self, checked: impl IntoIterator<Item = Result<()>>) {
+        self.0.extend(checked.into_iter().filter_map(Result::err));
+    }
+
+    /// Adds what is wrong with the names in a list; returns `true` if they are all different.
+    pub(super) fn names<'a>(&mut self, list: &str, names: impl Iterator<Item = &'a str>) -> bool {
+        let mut seen: Vec<&str> = Vec::new();
+        let mut are_different = true;
+        for (index, word) in names.enumerate() {
+            let key = item(list, index, "name");
+            self.take(name(&key, word));
+            if seen.contains(&word) {
+                are_different = false;
+                self.take::<()>(fail(key, format!("`{word}` is there twice"), "rename one of them"));
+            }
+            seen.push(word);
+        }
+        are_different
+    }
+
+    /// Returns what was found in spite of the errors, if there are none.
+    ///
+    /// # Errors
+    /// The first.
+    pub(super) fn or<T>(self, found: Option<T>) -> Result<T> {
+        let nothing = || SceneError::new("", "can't be used", "");
+        self.0.into_iter().next().map_or_else(|| found.ok_or_else(nothing), Err)
+    }
+}
+
+impl IntoIterator for Refused {
+    type Item = SceneError;
+    type IntoIter = std::vec::IntoIter<SceneError>;
+
+    fn into_iter(self) -> Self::IntoIter {
+        self.0.into_iter()
+    }
+}
+
 pub(super) fn fail<T>(
     key: impl Into<String>,
     problem: impl Into<String>,
@@ -36,20 +87,6 @@ pub(super) fn all_within(key: &str, values: &[f64], largest: f64) -> Result<()> 
 /// The key of an item of a list, as `--set` takes it.
 pub(super) fn item(list: &str, index: usize, key: &str) -> String {
     format!("{list}.{}.{key}", index + 1)
-}
-
-/// Names that are all different.
-pub(super) fn distinct<'a>(list: &str, names: impl Iterator<Item = &'a str>) -> Result<()> {
-    let mut seen: Vec<&str> = Vec::new();
-    for (index, word) in names.enumerate() {
-        let key = item(list, index, "name");
-        name(&key, word)?;
-        if seen.contains(&word) {
-            return fail(key, format!("`{word}` is there twice"), "rename one of them");
-        }
-        seen.push(word);
-    }
-    Ok(())
 }
 
 /// The version of a file's format.

@@ -2,9 +2,10 @@
 
 use super::{
     JointParameters,
-    check::{Result, all_within, distinct, fail, item, within},
+    build::control,
+    check::{Refused, Result, all_within, fail, item, name, schema, within},
     error::{SceneError, suggestion},
-    file::{FingertipFile, HandFile, JointFile, Safety, SceneFile},
+    file::{FingertipFile, HandFile, InertiaFile, JointFile, SafetyKey, SceneFile},
     object::{breaks_triangle, tensor},
 };
 use blindgrasp_body::FingertipModel;
@@ -12,34 +13,87 @@ use blindgrasp_body::JointFriction;
 use blindgrasp_body::{Hand, MAX_FINGERS, MAX_JOINTS, Posture};
 use blindgrasp_shared::{
     estimate::Encoder,
-    hand::{Fingertip, HandError, Joint, Link},
+    hand::{Fingertip, Joint, Link},
     math::Real,
 };
 use nalgebra::{DMatrix, Quaternion, SymmetricEigen, UnitQuaternion, Vector3};
+use std::collections::BTreeSet;
+use std::f64::consts::PI;
 
-/// Checks a hand and prepares it.
-pub(super) fn hand(file: &HandFile, warnings: &mut Vec<String>) -> Result<Hand> {
-    let tree = tree(file)?;
-    check_safety(&file.safety)?;
-    for (k, joint) in file.joints.iter().enumerate() {
-        let key = |name: &str| item("hand.joint", k, name);
-        check_joint(joint, &key)?;
-        if breaks_triangle(&tensor(&key("inertia_kg_m2"), &joint.inertia_kg_m2)?) {
-            warnings.push(format!(
-                "link `{}`: its inertia is that of no body: one moment is larger than the sum of the two others",
-                joint.name
-            ));
-        }
-    }
-    for (i, fingertip) in file.fingertips.iter().enumerate() {
-        check_fingertip(fingertip, &|name| item("hand.fingertip", i, name))?;
-    }
-    prepare(file, &tree)
+/// Numbers beyond are not computed with, in whatever unit they are.
+const LARGEST: f64 = 1e6;
+
+/// A hand's file, checked from end to end.
+pub(crate) struct Examined {
+    /// All for which it is refused; the keys are those of the file.
+    pub(crate) refused: Refused,
+    /// The file, for those who look further: joints that move no fingertip are left out, and numbers that no kinematics can be
+    /// computed with are replaced.
+    pub(crate) file: HandFile,
+    /// The number of each joint in the file as it was, from 1.
+    pub(crate) numbers: Vec<usize>,
+    /// Its kinematics and masses; `None` where it is not known what sits on what, or where.
+    pub(crate) hand: Option<Hand>,
 }
 
-/// The kinematics and masses of a hand, whatever size its numbers have: for those who look into what is wrong with it.
-pub(super) fn kinematics(file: &HandFile) -> Result<Hand> {
-    prepare(file, &tree(file)?)
+impl Examined {
+    /// Checks all that every hand needs, and goes on behind what is wrong. A firmware needs the table `[control]` as well.
+    pub(crate) fn of(file: &HandFile) -> Self {
+        let mut refused = Refused::default();
+        refused.take_all([schema("schema", file.schema), name("name", &file.name)]);
+        let tree = Tree::of(file, &mut refused);
+        if let Some(gains) = &file.control {
+            control(gains, &mut refused);
+        }
+        refused.take_all(file.safety.values().map(|(key, value)| safety(key, value)));
+        let (is_placed, mut file) = (is_placed(file), file.clone());
+        let mut joints = Vec::with_capacity(file.joints.len());
+        for (k, joint) in file.joints.iter_mut().enumerate() {
+            joints.push(check_joint(joint, &|name| item("joint", k, name), &mut refused));
+        }
+        let mut fingertips = Vec::with_capacity(file.fingertips.len());
+        for (i, fingertip) in file.fingertips.iter_mut().enumerate() {
+            fingertips.push(check_fingertip(fingertip, &|name| item("fingertip", i, name), &mut refused));
+        }
+        let mut numbers: Vec<usize> = (1..=joints.len()).collect();
+        let hand = tree.filter(|_| is_placed).and_then(|Tree { parents, links, kept }| {
+            numbers.retain(|number| kept.contains(&(number - 1)));
+            file.joints = kept.iter().map(|&k| file.joints[k].clone()).collect();
+            // Parents and links are kept.
+            let place = |k: usize| kept.partition_point(|&other| other < k);
+            let parent = |k: usize| parents[k].map(place);
+            let joints: Vec<_> = kept.iter().map(|&k| Joint { parent: parent(k), ..joints[k] }).collect();
+            let links = links.iter().map(|&link| place(link));
+            let tips: Vec<_> =
+                fingertips.iter().zip(links).map(|(&tip, link)| Fingertip { link, ..tip }).collect();
+            let prepared = Hand::new(&joints, &tips);
+            refused.take(prepared.or_else(|error| fail("joint", error.to_string(), "")))
+        });
+        Self { refused, file, numbers, hand }
+    }
+}
+
+/// Returns `true` if it is known where everything is, and can be computed with.
+fn is_placed(file: &HandFile) -> bool {
+    let small = |v: &f64| v.abs() < LARGEST;
+    file.joints.iter().all(|joint| {
+        let lengths = joint.offset_m.iter().chain(&joint.mass_centre_m).chain(&joint.rotation_rpy_rad);
+        direction(joint.axis).is_some() && lengths.chain([&joint.mass_kg]).all(small)
+    }) && file.fingertips.iter().all(|tip| tip.offset_m.iter().chain([&tip.radius_m]).all(small))
+}
+
+impl HandFile {
+    /// Checks all that every hand needs, and prepares it. A firmware needs the table `[control]` as well.
+    pub(crate) fn prepare(&self, warnings: &mut Vec<String>) -> Result<Hand> {
+        let Examined { refused, hand, .. } = Examined::of(self);
+        let hand = refused.or(hand)?;
+        let odd = (0..hand.joint_count()).filter(|&k| breaks_triangle(&hand.link(k).inertia_kg_m2));
+        warnings.extend(odd.map(|k| {
+            let name = &self.joints[k].name;
+            format!("link `{name}`: its inertia is that of no body: one moment is larger than the sum of the two others")
+        }));
+        Ok(hand)
+    }
 }
 
 /// The tree of joints, by index.
@@ -48,173 +102,185 @@ struct Tree {
     parents: Vec<Option<usize>>,
     /// Of each fingertip.
     links: Vec<usize>,
+    /// The joints that move fingertips, in their order.
+    kept: Vec<usize>,
 }
 
-/// Follows the names.
-fn tree(file: &HandFile) -> Result<Tree> {
-    // The shared crate checks this too, but not before the lists below have been searched for names.
-    let (joints, fingertips) = (file.joints.len(), file.fingertips.len());
-    let wrong_count = if joints == 0 {
-        Some(HandError::NoJoints)
-    } else if joints > MAX_JOINTS {
-        Some(HandError::TooManyJoints { count: joints, capacity: MAX_JOINTS })
-    } else if fingertips < 2 {
-        Some(HandError::TooFewFingertips { count: fingertips })
-    } else if fingertips > MAX_FINGERS {
-        Some(HandError::TooManyFingertips { count: fingertips, capacity: MAX_FINGERS })
-    } else {
-        None
-    };
-    if let Some(error) = wrong_count {
-        return Err(hand_error(file, error));
+impl Tree {
+    /// Follows the names; `None` where they don't say what sits on what.
+    fn of(file: &HandFile, refused: &mut Refused) -> Option<Self> {
+        let (joints, fingertips) = (&file.joints, &file.fingertips);
+        // Before lists of any length are searched for names.
+        let too_many = |what: &str, count: usize, most: usize| {
+            format!("the hand has {count} {what}: at most {most} are supported")
+        };
+        let wrong_count = match (joints.len(), fingertips.len()) {
+            (0, _) => fail("joint", "the hand has no joint", "add a [[joint]]"),
+            (count, _) if count > MAX_JOINTS => {
+                fail("joint", too_many("joints", count, MAX_JOINTS), "leave some out")
+            }
+            (_, count) if count < 2 => {
+                let tips = if count == 1 { "fingertip" } else { "fingertips" };
+                let problem = format!("the hand has {count} {tips}: grasping needs at least two");
+                fail("fingertip", problem, "add a [[fingertip]]")
+            }
+            (_, count) if count > MAX_FINGERS => {
+                fail("fingertip", too_many("fingertips", count, MAX_FINGERS), "leave some out")
+            }
+            _ => Ok(()),
+        };
+        refused.take(wrong_count)?;
+        let are_different = refused.names("joint", joints.iter().map(|joint| joint.name.as_str()));
+        refused.names("fingertip", fingertips.iter().map(|fingertip| fingertip.name.as_str()));
+        let mut find = |key: String, name: &str, before: usize| {
+            refused.take(match joints.iter().position(|joint| joint.name == name) {
+                Some(index) if index < before => Ok(index),
+                Some(_) => fail(key, format!("joint `{name}` does not come before this one"), "move it up"),
+                None => {
+                    let known = joints.iter().map(|joint| joint.name.as_str());
+                    fail(key, format!("there is no joint `{name}`"), suggestion(name, known))
+                }
+            })
+        };
+        // All of them are looked for before the first that is not found ends it.
+        let mut parent = |(k, joint): (usize, &JointFile)| match &joint.parent {
+            Some(name) => find(item("joint", k, "parent"), name, k).map(Some),
+            None => Some(None),
+        };
+        let parents: Vec<Option<Option<usize>>> = joints.iter().enumerate().map(&mut parent).collect();
+        let mut link =
+            |(i, tip): (usize, &FingertipFile)| find(item("fingertip", i, "link"), &tip.link, usize::MAX);
+        let links: Vec<Option<usize>> = fingertips.iter().enumerate().map(&mut link).collect();
+        let parents = parents.into_iter().collect::<Option<Vec<_>>>()?;
+        let links = links.into_iter().collect::<Option<Vec<_>>>().filter(|_| are_different)?;
+
+        let below = |&link: &usize| std::iter::successors(Some(link), |&k| parents[k]);
+        let moving: BTreeSet<usize> = links.iter().flat_map(below).collect();
+        for (k, joint) in joints.iter().enumerate() {
+            // What it carries is no matter of its own.
+            if !moving.contains(&k) && parents[k].is_none_or(|parent| moving.contains(&parent)) {
+                let problem = format!("joint `{}` moves no fingertip", joint.name);
+                let remedy = "leave it out and add its mass to its parent";
+                refused.take::<()>(fail(item("joint", k, "name"), problem, remedy));
+            }
+        }
+        Some(Self { parents, links, kept: moving.into_iter().collect() })
     }
-    distinct("hand.joint", file.joints.iter().map(|joint| joint.name.as_str()))?;
-    distinct("hand.fingertip", file.fingertips.iter().map(|fingertip| fingertip.name.as_str()))?;
-    let find = |key: String, name: &str, before: usize| match file
-        .joints
-        .iter()
-        .position(|joint| joint.name == name)
-    {
-        Some(index) if index < before => Ok(index),
-        Some(_) => fail(key, format!("joint `{name}` does not come before this one"), "move it up"),
-        None => fail(
-            key,
-            format!("there is no joint `{name}`"),
-            suggestion(name, file.joints.iter().map(|joint| joint.name.as_str())),
+}
+
+fn safety(key: &SafetyKey, value: f64) -> Result<()> {
+    if value >= key.least && value <= key.most {
+        return Ok(());
+    }
+    let remedy = format!("has to be between {} and {}; {} unless given", key.least, key.most, key.default);
+    fail(format!("safety.{}", key.name), format!("{value} is out of range"), remedy)
+}
+
+/// Checks the numbers of a fingertip, and replaces those that no kinematics can be computed with. Its link is still to be told.
+fn check_fingertip(
+    file: &mut FingertipFile,
+    key: &dyn Fn(&str) -> String,
+    refused: &mut Refused,
+) -> Fingertip<f64> {
+    refused.take_all([
+        all_within(&key("offset_m"), &file.offset_m, 10.0),
+        within(&key("radius_m"), file.radius_m, 1e-5, 1.0),
+        within(&key("stiffness_n_m2"), file.stiffness_n_m2, 1.0, 1e13),
+        within(&key("damping_n_s_m_per_m2"), file.damping_n_s_m_per_m2, 0.0, 1e12),
+        within(&key("torsional_damping_nm_s_rad_per_m2"), file.torsional_damping_nm_s_rad_per_m2, 0.0, 1e12),
+    ]);
+    if !(file.radius_m > 0.0) {
+        file.radius_m = 0.01;
+    }
+    Fingertip { link: 0, offset_m: file.offset_m.into(), radius_m: file.radius_m }
+}
+
+/// Checks the numbers of a joint, and replaces those that no kinematics can be computed with. Its parent is still to be told.
+fn check_joint(file: &mut JointFile, key: &dyn Fn(&str) -> String, refused: &mut Refused) -> Joint<f64> {
+    refused.take_all([
+        all_within(&key("offset_m"), &file.offset_m, 10.0),
+        all_within(&key("rotation_rpy_rad"), &file.rotation_rpy_rad, 100.0),
+        all_within(&key("axis"), &file.axis, 1e6),
+        all_within(&key("limits_rad"), &file.limits_rad, 100.0),
+        within(&key("mass_kg"), file.mass_kg, 0.0, 1e4),
+        all_within(&key("mass_centre_m"), &file.mass_centre_m, 10.0),
+        within(&key("damping_gain_nm_s_rad"), file.damping_gain_nm_s_rad, 0.0, 1e6),
+        within(&key("torque_limit_nm"), file.torque_limit_nm, 1e-9, 1e6),
+        within(&key("speed_limit_rad_s"), file.speed_limit_rad_s, 1e-6, 1e6),
+        within(&key("encoder_counts_per_turn"), file.encoder_counts_per_turn, 8.0, 1e9),
+        all_within(
+            &key("encoder_zero_count"),
+            &[f64::from(file.encoder_zero_count)],
+            f64::from(Encoder::MOST_ZERO_COUNT),
         ),
-    };
-    let parent = |(k, joint): (usize, &JointFile)| match &joint.parent {
-        Some(name) => find(item("hand.joint", k, "parent"), name, k).map(Some),
-        None => Ok(None),
-    };
-    let link =
-        |(i, tip): (usize, &FingertipFile)| find(item("hand.fingertip", i, "link"), &tip.link, usize::MAX);
-    Ok(Tree {
-        parents: file.joints.iter().enumerate().map(parent).collect::<Result<_>>()?,
-        links: file.fingertips.iter().enumerate().map(link).collect::<Result<_>>()?,
-    })
-}
-
-/// Hands the numbers to the shared crate.
-fn prepare(file: &HandFile, tree: &Tree) -> Result<Hand> {
-    let mut joints = Vec::with_capacity(file.joints.len());
-    for (k, (joint, &parent)) in file.joints.iter().zip(&tree.parents).enumerate() {
-        let inertia_kg_m2 = tensor(&item("hand.joint", k, "inertia_kg_m2"), &joint.inertia_kg_m2)?;
-        joints.push(Joint {
-            parent,
-            offset_m: joint.offset_m.into(),
-            attitude: rotation(joint.rotation_rpy_rad).to_rotation_matrix().into_inner(),
-            axis: joint.axis.into(),
-            lower_rad: joint.limits_rad[0],
-            upper_rad: joint.limits_rad[1],
-            link: Link { mass_kg: joint.mass_kg, mass_centre_m: joint.mass_centre_m.into(), inertia_kg_m2 },
-        });
+        within(&key("torque_per_volt_nm_v"), file.torque_per_volt_nm_v, 1e-6, 1e4)
+            .map_err(|error| SceneError { remedy: error.remedy + "; its sign is `motor_reversed`", ..error }),
+        within(&key("viscous_friction_nm_s_rad"), file.viscous_friction_nm_s_rad, 0.0, 1e6),
+        within(&key("coulomb_friction_nm"), file.coulomb_friction_nm, 0.0, 1e6),
+        within(&key("presliding_rad"), file.presliding_rad, 1e-9, 1.0),
+        within(&key("presliding_damping_nm_s_rad"), file.presliding_damping_nm_s_rad, 0.0, 1e6),
+    ]);
+    if refused.take(tensor(&key("inertia_kg_m2"), &file.inertia_kg_m2)).is_none() {
+        file.inertia_kg_m2 = InertiaFile::default();
     }
-    let tips = file.fingertips.iter().zip(&tree.links);
-    let fingertips: Vec<Fingertip<f64>> = tips
-        .map(|(tip, &link)| Fingertip { link, offset_m: tip.offset_m.into(), radius_m: tip.radius_m })
-        .collect();
-    Hand::new(&joints, &fingertips).map_err(|error| hand_error(file, error))
-}
-
-fn check_safety(safety: &Safety) -> Result<()> {
-    for (key, value) in safety.values() {
-        if !(value >= key.least && value <= key.most) {
-            return fail(
-                format!("hand.safety.{}", key.name),
-                format!("{value} is out of range"),
-                format!("has to be between {} and {}; {} unless given", key.least, key.most, key.default),
-            );
-        }
+    for (parameter, reason) in described(file).faults() {
+        let (name, remedy) = match parameter {
+            "offset" => ("offset_m", "give finite numbers"),
+            "attitude" => ("rotation_rpy_rad", "give finite numbers"),
+            "axis" => {
+                file.axis = direction(file.axis).unwrap_or([0.0, 0.0, 1.0]);
+                ("axis", "divide it by its length")
+            }
+            "limits" => {
+                let [a, b] = file.limits_rad;
+                file.limits_rad = if a > b { [b, a] } else { [-PI, PI] };
+                ("limits_rad", "write [lower, upper]")
+            }
+            "mass" => {
+                file.mass_kg = 0.0;
+                ("mass_kg", "give it in kilograms")
+            }
+            "mass centre" => ("mass_centre_m", "give finite numbers"),
+            _ => {
+                file.inertia_kg_m2 = InertiaFile::default();
+                ("inertia_kg_m2", "give the inertia about the mass centre as [xx, yy, zz, xy, xz, yz]")
+            }
+        };
+        let problem = format!("joint `{}`: {parameter} {reason}", file.name);
+        refused.take::<()>(fail(key(name), problem, remedy));
     }
-    Ok(())
-}
-
-fn check_fingertip(fingertip: &FingertipFile, key: &dyn Fn(&str) -> String) -> Result<()> {
-    all_within(&key("offset_m"), &fingertip.offset_m, 10.0)?;
-    within(&key("radius_m"), fingertip.radius_m, 1e-5, 1.0)?;
-    within(&key("stiffness_n_m2"), fingertip.stiffness_n_m2, 1.0, 1e13)?;
-    within(&key("damping_n_s_m_per_m2"), fingertip.damping_n_s_m_per_m2, 0.0, 1e12)?;
-    let torsion = fingertip.torsional_damping_nm_s_rad_per_m2;
-    within(&key("torsional_damping_nm_s_rad_per_m2"), torsion, 0.0, 1e12)
-}
-
-fn check_joint(joint: &JointFile, key: &dyn Fn(&str) -> String) -> Result<()> {
-    all_within(&key("offset_m"), &joint.offset_m, 10.0)?;
-    all_within(&key("rotation_rpy_rad"), &joint.rotation_rpy_rad, 100.0)?;
-    all_within(&key("axis"), &joint.axis, 1e6)?;
-    all_within(&key("limits_rad"), &joint.limits_rad, 100.0)?;
-    let [lower, upper] = joint.limits_rad;
-    if lower < upper && !(joint.nominal_rad >= lower && joint.nominal_rad <= upper) {
-        return fail(
-            key("nominal_rad"),
-            format!("{:?} is outside the limits", joint.nominal_rad),
-            format!("has to be between {lower} and {upper}"),
-        );
+    let [lower, upper] = file.limits_rad;
+    if !(file.nominal_rad >= lower && file.nominal_rad <= upper) {
+        let problem = format!("{:?} is outside the limits", file.nominal_rad);
+        let remedy = format!("has to be between {lower} and {upper}");
+        refused.take::<()>(fail(key("nominal_rad"), problem, remedy));
     }
-    within(&key("mass_kg"), joint.mass_kg, 0.0, 1e4)?;
-    all_within(&key("mass_centre_m"), &joint.mass_centre_m, 10.0)?;
-    within(&key("damping_gain_nm_s_rad"), joint.damping_gain_nm_s_rad, 0.0, 1e6)?;
-    within(&key("torque_limit_nm"), joint.torque_limit_nm, 1e-9, 1e6)?;
-    within(&key("speed_limit_rad_s"), joint.speed_limit_rad_s, 1e-6, 1e6)?;
-    within(&key("encoder_counts_per_turn"), joint.encoder_counts_per_turn, 8.0, 1e9)?;
-    let most_zero_count = f64::from(Encoder::MOST_ZERO_COUNT);
-    all_within(&key("encoder_zero_count"), &[f64::from(joint.encoder_zero_count)], most_zero_count)?;
-    within(&key("torque_per_volt_nm_v"), joint.torque_per_volt_nm_v, 1e-6, 1e4)
-        .map_err(|error| SceneError { remedy: error.remedy + "; its sign is `motor_reversed`", ..error })?;
-    within(&key("viscous_friction_nm_s_rad"), joint.viscous_friction_nm_s_rad, 0.0, 1e6)?;
-    within(&key("coulomb_friction_nm"), joint.coulomb_friction_nm, 0.0, 1e6)?;
-    within(&key("presliding_rad"), joint.presliding_rad, 1e-9, 1.0)?;
-    within(&key("presliding_damping_nm_s_rad"), joint.presliding_damping_nm_s_rad, 0.0, 1e6)
+    described(file)
 }
 
-/// The shared crate's error, with the key and the name of the joint.
-fn hand_error(file: &HandFile, error: HandError) -> SceneError {
-    let joint_name = |joint: usize| file.joints.get(joint).map_or("?", |joint| joint.name.as_str());
-    match error {
-        HandError::NoJoints => SceneError::new("hand.joint", "the hand has no joint", "add a [[joint]]"),
-        HandError::TooFewFingertips { count } => SceneError::new(
-            "hand.fingertip",
-            format!(
-                "the hand has {count} fingertip{}: grasping needs at least two",
-                if count == 1 { "" } else { "s" }
-            ),
-            "add a [[fingertip]]",
-        ),
-        HandError::TooManyJoints { .. } => SceneError::new("hand.joint", error.to_string(), "leave some out"),
-        HandError::TooManyFingertips { .. } => {
-            SceneError::new("hand.fingertip", error.to_string(), "leave some out")
-        }
-        HandError::ParentNotBefore { joint } => {
-            SceneError::new(item("hand.joint", joint, "parent"), error.to_string(), "move it up")
-        }
-        HandError::MovesNoFingertip { joint } => SceneError::new(
-            item("hand.joint", joint, "name"),
-            format!("joint `{}` moves no fingertip", joint_name(joint)),
-            "leave it out and add its mass to its parent",
-        ),
-        HandError::Joint { joint, parameter, reason } => {
-            let (key, remedy) = match parameter {
-                "offset" => ("offset_m", "give finite numbers"),
-                "attitude" => ("rotation_rpy_rad", "give finite numbers"),
-                "axis" => ("axis", "divide it by its length"),
-                "limits" => ("limits_rad", "write [lower, upper]"),
-                "mass" => ("mass_kg", "give it in kilograms"),
-                "mass centre" => ("mass_centre_m", "give finite numbers"),
-                _ => ("inertia_kg_m2", "give the inertia about the mass centre as [xx, yy, zz, xy, xz, yz]"),
-            };
-            let problem = format!("joint `{}`: {parameter} {reason}", joint_name(joint));
-            SceneError::new(item("hand.joint", joint, key), problem, remedy)
-        }
-        HandError::Fingertip { fingertip, parameter, reason } => {
-            let key = match parameter {
-                "link" => "link",
-                "offset" => "offset_m",
-                _ => "radius_m",
-            };
-            SceneError::new(item("hand.fingertip", fingertip, key), format!("{parameter} {reason}"), "")
-        }
+/// The numbers of a joint as the shared crate takes them.
+fn described(file: &JointFile) -> Joint<f64> {
+    Joint {
+        parent: None,
+        offset_m: file.offset_m.into(),
+        attitude: rotation(file.rotation_rpy_rad).to_rotation_matrix().into_inner(),
+        axis: file.axis.into(),
+        lower_rad: file.limits_rad[0],
+        upper_rad: file.limits_rad[1],
+        link: Link {
+            mass_kg: file.mass_kg,
+            mass_centre_m: file.mass_centre_m.into(),
+            // What is refused was told.
+            inertia_kg_m2: tensor("", &file.inertia_kg_m2).unwrap_or_default(),
+        },
     }
+}
+
+/// The unit vector along an axis, whatever length that has.
+pub(crate) fn direction(axis: [f64; 3]) -> Option<[f64; 3]> {
+    let axis = Vector3::from(axis);
+    // Squares of large numbers are none.
+    (axis / axis.amax()).try_normalize(0.0).filter(|axis| axis.iter().all(|v| v.is_finite())).map(Into::into)
 }
 
 pub(super) fn joint_parameters(joint: &JointFile, file: &SceneFile) -> JointParameters {
@@ -264,8 +330,9 @@ pub fn posture(hand: &Hand, angles: &[f64]) -> Posture {
     posture
 }
 
-/// Every combination of joint speeds has to move mass: the integrator divides by the mass matrix.
-pub(crate) fn moving_masses(file: &HandFile, hand: &Hand, angles: &[f64]) -> Result<()> {
+/// Returns the joints that move no mass: every combination of joint speeds has to, since the integrator divides by the mass
+/// matrix.
+pub(crate) fn still_joints(hand: &Hand, angles: &[f64]) -> Vec<usize> {
     let count = hand.joint_count();
     let posture = posture(hand, angles);
     let mut mass = DMatrix::<f64>::zeros(count, count);
@@ -284,26 +351,16 @@ pub(crate) fn moving_masses(file: &HandFile, hand: &Hand, angles: &[f64]) -> Res
             }
         }
     }
-    let still = |k: usize| {
-        fail(
-            item("hand.joint", k, "mass_kg"),
-            format!("joint `{}` moves no mass", file.joints[k].name),
-            "give its link a mass and an inertia",
-        )
-    };
-    if let Some(k) = (0..count).find(|&k| !(mass[(k, k)] > 0.0)) {
-        return still(k);
-    }
+    let is_still = |k: usize| !(mass[(k, k)] > 0.0);
     // Scaled to ones on the diagonal, so that small links next to large ones count in full.
-    let scaled = DMatrix::from_fn(count, count, |a, b| {
-        mass[(a, b)] / (mass[(a, a)].square_root() * mass[(b, b)].square_root())
+    let scaled = DMatrix::from_fn(count, count, |a, b| match is_still(a) || is_still(b) {
+        true => f64::from(u8::from(a == b)),
+        false => mass[(a, b)] / (mass[(a, a)].square_root() * mass[(b, b)].square_root()),
     });
     let modes = SymmetricEigen::new(scaled);
-    let least = modes.eigenvalues.imin();
-    if !(modes.eigenvalues[least] > 1e-9) {
-        return still(modes.eigenvectors.column(least).iamax());
-    }
-    Ok(())
+    let together = (0..count).filter(|&mode| !(modes.eigenvalues[mode] > 1e-9));
+    let together = together.map(|mode| modes.eigenvectors.column(mode).iamax());
+    (0..count).filter(|&k| is_still(k)).chain(together).collect()
 }
 
 /// Fingertips that are in each other's way at the start. The paper's model has no contact between fingers.

@@ -2,12 +2,10 @@
 
 use super::Scene;
 use super::{
-    build::control,
-    check::{Result, fail, name, schema},
+    check::{Result, fail},
     controller::Setup,
     error::{Notice, Place, SceneError, one_line},
     file::{Actuators, HandFile, JointFile, PlantSettings, Sensors},
-    hand::{hand, kinematics},
     library::{Document, Kind, is_path},
 };
 use blindgrasp_body::{Hand, MAX_JOINTS};
@@ -136,6 +134,11 @@ impl HandModel {
     pub(crate) fn build(file: &HandFile) -> Result<Self> {
         let mut warnings = Vec::new();
         let hand = file.prepare(&mut warnings)?;
+        Ok(Self { warnings, ..Self::of_prepared(file, hand)? })
+    }
+
+    /// Of a hand's file that was checked, and the hand that it is.
+    pub(crate) fn of_prepared(file: &HandFile, hand: Hand) -> Result<Self> {
         let Some(gains) = &file.control else {
             return fail(
                 "control",
@@ -161,7 +164,8 @@ impl HandModel {
         let joint_names = file.joints.iter().map(|joint| joint.name.clone()).collect();
         let per_volt = |joint: &JointFile| joint.torque_per_volt_nm_v as f32;
         let torques_per_volt_nm_v = file.joints.iter().map(per_volt).collect();
-        Ok(Self { name: file.name.clone(), hand, joint_names, config, torques_per_volt_nm_v, warnings })
+        let (name, warnings) = (file.name.clone(), Vec::new());
+        Ok(Self { name, hand, joint_names, config, torques_per_volt_nm_v, warnings })
     }
 }
 
@@ -181,19 +185,6 @@ impl HandFile {
         warnings.splice(0..0, notices.iter().map(Notice::to_string));
         Ok((file, hand, warnings))
     }
-
-    /// Checks all that every hand needs, and prepares it. A firmware needs the table `[control]` as well.
-    pub(crate) fn prepare(&self, warnings: &mut Vec<String>) -> Result<Hand> {
-        schema("schema", self.schema)?;
-        name("name", &self.name)?;
-        self.control.as_ref().map_or(Ok(()), control)?;
-        hand(self, warnings).map_err(as_of_hand)
-    }
-
-    /// The kinematics and masses, whatever size the numbers have: for those who look into what is wrong with a hand.
-    pub(crate) fn kinematics(&self) -> Result<Hand> {
-        kinematics(self).map_err(as_of_hand)
-    }
 }
 
 /// Reads a hand and checks it; what is wrong gets its place.
@@ -207,12 +198,4 @@ fn checked<T>(
         error.at(&place)
     })?;
     Ok((file, found, places.notices))
-}
-
-/// The checks know the keys of a scene.
-fn as_of_hand(mut error: SceneError) -> SceneError {
-    if let Some(key) = error.key.strip_prefix("hand.") {
-        error.key = key.into();
-    }
-    error
 }

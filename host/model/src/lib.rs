@@ -50,8 +50,8 @@ pub use error::{Notice, Place, SceneError, suggestion};
 pub use file::{
     Actuators, Control, Friction, HandFile, ObjectFile, PlantSettings, Safety, SceneFile, Sensors,
 };
-pub(crate) use hand::moving_masses;
 pub use hand::posture;
+pub(crate) use hand::{Examined, direction, still_joints};
 pub use hand_model::HandModel;
 pub use library::is_of_files;
 pub use object::ObjectBody;

@@ -382,7 +382,7 @@ impl SceneError {
     }
 
     /// Of a part of something larger.
-    fn below(mut self, key: &str) -> Self {
+    pub(super) fn below(mut self, key: &str) -> Self {
         if !self.key.is_empty() {
             self.key = format!("{key}.{}", self.key);
         }

@@ -1,7 +1,7 @@
 //! The object of a scene: its shape, mass and inertia.
 
 use super::{
-    check::{Result, all_within, fail, name, schema, within},
+    check::{Refused, Result, all_within, fail, name, schema, within},
     error::SceneError,
     file::{InertiaFile, ObjectFile, ShapeFile},
 };
@@ -29,15 +29,16 @@ impl ObjectFile {
     /// # Errors
     /// What is wrong, with the key in the object's file.
     pub fn body(&self, warnings: &mut Vec<String>) -> Result<ObjectBody> {
-        schema("schema", self.schema)?;
-        name("name", &self.name)?;
+        let (body, refused) = self.examine(warnings);
+        refused.or(body)
+    }
+
+    /// The same, with all that is wrong.
+    pub(crate) fn examine(&self, warnings: &mut Vec<String>) -> (Option<ObjectBody>, Refused) {
         let bare = self.mass_kg.is_none() && self.density_kg_m3.is_none();
-        let weighed =
-            ObjectFile { density_kg_m3: bare.then_some(1000.0).or(self.density_kg_m3), ..self.clone() };
-        object(&weighed, warnings).map_err(|mut error| {
-            error.key = error.key.trim_start_matches("object.").to_owned();
-            error
-        })
+        let density_kg_m3 = bare.then_some(1000.0).or(self.density_kg_m3);
+        let mut refused = Refused::default();
+        (examine(&Self { density_kg_m3, ..self.clone() }, warnings, &mut refused), refused)
     }
 }
 
@@ -67,75 +68,88 @@ pub(super) fn polyhedron(shape: &ShapeFile) -> std::result::Result<Polyhedron, P
 
 /// Checks an object and computes its mass and inertia.
 pub(super) fn object(file: &ObjectFile, warnings: &mut Vec<String>) -> Result<ObjectBody> {
+    let mut refused = Refused::default();
+    let body = examine(file, warnings, &mut refused);
+    refused.or(body)
+}
+
+fn examine(file: &ObjectFile, warnings: &mut Vec<String>, refused: &mut Refused) -> Option<ObjectBody> {
+    refused.take_all([schema("schema", file.schema), name("name", &file.name)]);
     if let ShapeFile::Mesh { flat_deg, flat_m, .. } = &file.shape {
-        within("object.shape.mesh.flat_deg", *flat_deg, 0.0, 45.0)?;
-        within("object.shape.mesh.flat_m", flat_m.unwrap_or_default(), 0.0, 1.0)?;
+        refused.take_all([
+            within("shape.mesh.flat_deg", *flat_deg, 0.0, 45.0),
+            within("shape.mesh.flat_m", flat_m.unwrap_or_default(), 0.0, 1.0),
+        ]);
     }
+    let shape = refused.take(shape(file));
+    let uniform = shape.as_ref().map(Polyhedron::mass_properties);
+    let mass_kg = refused.take(match (file.mass_kg, file.density_kg_m3) {
+        (Some(_), Some(_)) => fail("density_kg_m3", "mass and density are both given", "leave one out"),
+        (None, None) => fail("mass_kg", "neither mass nor density is given", "add `mass_kg = ...`"),
+        (mass, density) => {
+            density.map_or(Ok(()), |density| within("density_kg_m3", density, 1e-3, 1e5)).and_then(|()| {
+                let mass_kg = mass.or_else(|| Some(density? * uniform.as_ref()?.volume_m3));
+                mass_kg.map_or(Ok(None), |mass| within("mass_kg", mass, 1e-9, 1e4).map(|()| Some(mass)))
+            })
+        }
+    });
+    let inertia_kg_m2 = file.inertia_kg_m2.as_ref().map(|inertia| refused.take(inertia_of(inertia)));
+    let (shape, uniform, mass_kg) = (shape?, uniform?, mass_kg??);
+    let Some(inertia_kg_m2) = inertia_kg_m2 else {
+        return Some(ObjectBody { shape, mass_kg, inertia_kg_m2: uniform.inertia_per_kg_m2 * mass_kg });
+    };
+    let inertia_kg_m2 = inertia_kg_m2?;
+    let (radius, largest) = (shape.radius_m(), SymmetricEigen::new(inertia_kg_m2).eigenvalues.max());
+    if breaks_triangle(&inertia_kg_m2) {
+        warnings.push(format!(
+            "object `{}`: its inertia is that of no body: one moment is larger than the sum of the two others",
+            file.name
+        ));
+    }
+    if largest > mass_kg * radius * radius {
+        warnings.push(format!(
+            "object `{}`: its inertia needs mass outside of it: {largest:.3e} kg m^2, but {mass_kg} kg within \
+             {radius:.3} m make {:.3e} kg m^2 at most",
+            file.name,
+            mass_kg * radius * radius,
+        ));
+    }
+    Some(ObjectBody { shape, mass_kg, inertia_kg_m2 })
+}
+
+/// The polyhedron, if it has the size of an object.
+fn shape(file: &ObjectFile) -> Result<Polyhedron> {
     let shape = polyhedron(&file.shape).map_err(|error| {
         let key = match file.shape {
-            ShapeFile::Box { .. } => "object.shape.box.size_m",
-            ShapeFile::Prism { .. } => "object.shape.prism",
-            ShapeFile::PolygonPrism { .. } => "object.shape.polygon_prism",
-            ShapeFile::Hull { .. } => "object.shape.hull.points_m",
-            ShapeFile::Pyramid { .. } => "object.shape.pyramid",
-            ShapeFile::Mesh { .. } => "object.shape.mesh",
+            ShapeFile::Box { .. } => "shape.box.size_m",
+            ShapeFile::Prism { .. } => "shape.prism",
+            ShapeFile::PolygonPrism { .. } => "shape.polygon_prism",
+            ShapeFile::Hull { .. } => "shape.hull.points_m",
+            ShapeFile::Pyramid { .. } => "shape.pyramid",
+            ShapeFile::Mesh { .. } => "shape.mesh",
         };
         SceneError::new(key, error.to_string(), error.remedy())
     })?;
     let radius = shape.radius_m();
     if !(1e-4..=10.0).contains(&radius) {
         return fail(
-            "object.shape",
+            "shape",
             format!("reaches {radius:.3e} m from its centre of mass"),
             "has to be between 0.1 mm and 10 m: give lengths in metres, and a mesh its unit",
         );
     }
-    let uniform = shape.mass_properties();
-    let mass_kg = match (file.mass_kg, file.density_kg_m3) {
-        (Some(mass), None) => mass,
-        (None, Some(density)) => {
-            within("object.density_kg_m3", density, 1e-3, 1e5)?;
-            density * uniform.volume_m3
-        }
-        (Some(_), Some(_)) => {
-            return fail("object.density_kg_m3", "mass and density are both given", "leave one out");
-        }
-        (None, None) => {
-            return fail("object.mass_kg", "neither mass nor density is given", "add `mass_kg = ...`");
-        }
-    };
-    within("object.mass_kg", mass_kg, 1e-9, 1e4)?;
-    let inertia_kg_m2 = match &file.inertia_kg_m2 {
-        None => uniform.inertia_per_kg_m2 * mass_kg,
-        Some(inertia) => {
-            let inertia = tensor("object.inertia_kg_m2", inertia)?;
-            let moments = SymmetricEigen::new(inertia).eigenvalues;
-            if !(moments.min() > 1e-9 * moments.max()) {
-                return fail(
-                    "object.inertia_kg_m2",
-                    "is not positive definite",
-                    "give the inertia about the centre of mass as [xx, yy, zz, xy, xz, yz], or leave it out",
-                );
-            }
-            if breaks_triangle(&inertia) {
-                warnings.push(format!(
-                    "object `{}`: its inertia is that of no body: one moment is larger than the sum of the two others",
-                    file.name
-                ));
-            }
-            if moments.max() > mass_kg * radius * radius {
-                warnings.push(format!(
-                    "object `{}`: its inertia needs mass outside of it: {:.3e} kg m^2, but {mass_kg} kg within \
-                     {radius:.3} m make {:.3e} kg m^2 at most",
-                    file.name,
-                    moments.max(),
-                    mass_kg * radius * radius,
-                ));
-            }
-            inertia
-        }
-    };
-    Ok(ObjectBody { shape, mass_kg, inertia_kg_m2 })
+    Ok(shape)
+}
+
+/// An inertia that a body can have.
+fn inertia_of(file: &InertiaFile) -> Result<Matrix3<f64>> {
+    let inertia = tensor("inertia_kg_m2", file)?;
+    let moments = SymmetricEigen::new(inertia).eigenvalues;
+    if moments.min() > 1e-9 * moments.max() {
+        return Ok(inertia);
+    }
+    let remedy = "give the inertia about the centre of mass as [xx, yy, zz, xy, xz, yz], or leave it out";
+    fail("inertia_kg_m2", "is not positive definite", remedy)
 }
 
 /// A symmetric tensor from the three or six numbers of a file.

@@ -1,8 +1,8 @@
-//! The check of a hand's description: the first thing that is wrong, with the joint or fingertip that it is wrong with.
+//! The check of a hand's description: all that is wrong with a joint or a fingertip, and the first of it in a hand.
 
-use super::model::{Fingertip, HandError, Joint};
+use super::model::{Fingertip, HandError, Joint, Link};
 use crate::math::{Real, norm};
-use nalgebra::Matrix3;
+use nalgebra::{Matrix3, Vector3};
 
 pub(super) fn check_counts<const J: usize, const F: usize>(
     joints: usize,
@@ -29,31 +29,48 @@ fn tolerance<T: Real>() -> T {
     T::from_f64(1e-5)
 }
 
+impl<T: Real> Joint<T> {
+    /// Returns the parameters that are not what they have to be, each with what that is.
+    pub fn faults(&self) -> impl Iterator<Item = (&'static str, &'static str)> {
+        let Link { mass_kg, mass_centre_m, inertia_kg_m2 } = &self.link;
+        let (lower, upper) = (self.lower_rad, self.upper_rad);
+        // The comparisons are written so that NaN fails them.
+        faults([
+            (are_finite(&self.offset_m), "offset", "has to be finite"),
+            (is_rotation(&self.attitude), "attitude", "has to be a rotation"),
+            ((norm(&self.axis) - T::one()).magnitude() < tolerance(), "axis", "has to be a unit vector"),
+            (
+                lower.is_finite() && upper.is_finite() && lower < upper,
+                "limits",
+                "have to be finite, the lower below the upper",
+            ),
+            (*mass_kg >= T::zero() && mass_kg.is_finite(), "mass", "has to be zero or positive"),
+            (are_finite(mass_centre_m), "mass centre", "has to be finite"),
+            (is_semidefinite(inertia_kg_m2), "inertia", "has to be symmetric and positive semidefinite"),
+        ])
+    }
+}
+
+impl<T: Real> Fingertip<T> {
+    /// Returns the parameters other than its link that are not what they have to be, each with what that is.
+    pub fn faults(&self) -> impl Iterator<Item = (&'static str, &'static str)> {
+        let radius_m = self.radius_m;
+        faults([
+            (are_finite(&self.offset_m), "offset", "has to be finite"),
+            (radius_m > T::zero() && radius_m.is_finite(), "radius", "has to be positive"),
+        ])
+    }
+}
+
+fn faults<const N: usize>(
+    checks: [(bool, &'static str, &'static str); N],
+) -> impl Iterator<Item = (&'static str, &'static str)> {
+    checks.into_iter().filter_map(|(is_right, parameter, reason)| (!is_right).then_some((parameter, reason)))
+}
+
 pub(super) fn check_joint<T: Real>(k: usize, joint: &Joint<T>) -> Result<(), HandError> {
-    let fail = |parameter, reason| Err(HandError::Joint { joint: k, parameter, reason });
-    if !joint.offset_m.iter().all(|v| v.is_finite()) {
-        return fail("offset", "has to be finite");
-    }
-    if !is_rotation(&joint.attitude) {
-        return fail("attitude", "has to be a rotation");
-    }
-    // The comparisons are written so that NaN fails them.
-    if !((norm(&joint.axis) - T::one()).magnitude() < tolerance()) {
-        return fail("axis", "has to be a unit vector");
-    }
-    if !(joint.lower_rad.is_finite() && joint.upper_rad.is_finite() && joint.lower_rad < joint.upper_rad) {
-        return fail("limits", "have to be finite, the lower below the upper");
-    }
-    if !(joint.link.mass_kg >= T::zero() && joint.link.mass_kg.is_finite()) {
-        return fail("mass", "has to be zero or positive");
-    }
-    if !joint.link.mass_centre_m.iter().all(|v| v.is_finite()) {
-        return fail("mass centre", "has to be finite");
-    }
-    if !is_semidefinite(&joint.link.inertia_kg_m2) {
-        return fail("inertia", "has to be symmetric and positive semidefinite");
-    }
-    Ok(())
+    let fault = joint.faults().next();
+    fault.map_or(Ok(()), |(parameter, reason)| Err(HandError::Joint { joint: k, parameter, reason }))
 }
 
 pub(super) fn check_fingertip<T: Real>(
@@ -61,17 +78,13 @@ pub(super) fn check_fingertip<T: Real>(
     fingertip: &Fingertip<T>,
     joints: usize,
 ) -> Result<(), HandError> {
-    let fail = |parameter, reason| Err(HandError::Fingertip { fingertip: i, parameter, reason });
-    if fingertip.link >= joints {
-        return fail("link", "has to be the index of a joint");
-    }
-    if !fingertip.offset_m.iter().all(|v| v.is_finite()) {
-        return fail("offset", "has to be finite");
-    }
-    if !(fingertip.radius_m > T::zero() && fingertip.radius_m.is_finite()) {
-        return fail("radius", "has to be positive");
-    }
-    Ok(())
+    let link = (fingertip.link >= joints).then_some(("link", "has to be the index of a joint"));
+    let fault = link.or_else(|| fingertip.faults().next());
+    fault.map_or(Ok(()), |(parameter, reason)| Err(HandError::Fingertip { fingertip: i, parameter, reason }))
+}
+
+fn are_finite<T: Real>(v: &Vector3<T>) -> bool {
+    v.iter().all(|v| v.is_finite())
 }
 
 fn is_rotation<T: Real>(m: &Matrix3<T>) -> bool {

@@ -54,14 +54,6 @@ macro_rules! safety_keys {
             pub fn values(&self) -> impl Iterator<Item = (&'static SafetyKey, f64)> {
                 Self::KEYS.iter().zip([$(f64::from(self.$name)),*])
             }
-
-            /// Puts a key back to its default.
-            pub(crate) fn reset(&mut self, key: &str) {
-                match key {
-                    $(stringify!($name) => self.$name = $default,)*
-                    _ => {}
-                }
-            }
         }
     };
 }

@@ -1,24 +1,21 @@
 //! `hand check`: what a hand is, whether it can be used, and what is likely a mistake.
 //!
-//! `mend` and `structure` put the file before the loader until all that it refuses is known; a `specimen` is what can then be
-//! computed with. `rules` look at it: each kind of mistake is a rule. `reach`, `meeting` and `strength` compute what the
+//! What the loader refuses, it lists; a `specimen` is what can be computed with all the same. `rules` look at it: each kind of mistake is a rule. `reach`, `meeting` and `strength` compute what the
 //! rules and the `facts` need: how far fingertips get, where they meet, what the motors can do. `text` shows it to people.
 
 mod facts;
 mod found;
 mod meeting;
-mod mend;
 mod reach;
 mod rules;
 mod specimen;
 mod strength;
-mod structure;
 #[cfg(test)]
 mod tests;
 mod text;
 
 use super::finding::{Counts, Finding, Findings, Severity, Verdict};
-use crate::{HandFile, HandModel, Places, SceneError, moving_masses};
+use crate::{Examined, HandFile, HandModel, Places, SceneError, still_joints};
 use blindgrasp_body::{Hand, MAX_JOINTS};
 use found::Found;
 use serde::Serialize;
@@ -92,9 +89,9 @@ impl HandCheck {
         let meetings = specimen.map(|specimen| {
             let meetings = meeting::meetings(specimen);
             look(specimen, &meetings, &mut found);
+            confirm(specimen, &mut found);
             facts::meetings(specimen, &meetings)
         });
-        confirm(&file, &mut found);
         let mut findings = Findings::default();
         findings.extend(found.findings.into_iter().map(|finding| {
             let place = places.of(&finding.key);
@@ -135,19 +132,12 @@ fn examine(file: &HandFile, found: &mut Found) -> Option<Specimen> {
     for rule in [axes, degrees, lengths, radii] {
         rule(file, found);
     }
-    for error in mend::refused_numbers(file) {
+    let Examined { refused, file: mended, numbers, hand } = Examined::of(file);
+    for error in refused {
         let subject = subject_of(file, &error.key);
         found.refuse(error, subject);
     }
-    let mut mended = file.clone();
-    let is_placed = mend::mend_kinematics(&mut mended);
-    let structure = structure::settle(&mut mended);
-    for error in structure.refused {
-        let subject = subject_of(file, &error.key);
-        found.refuse(error, subject);
-    }
-    let hand = structure.hand.filter(|_| is_placed)?;
-    Some(Specimen::new(mended, structure.numbers, hand))
+    Some(Specimen::new(mended, numbers, hand?))
 }
 
 /// All that needs the tree.
@@ -175,41 +165,21 @@ fn look(specimen: &Specimen, meetings: &meeting::Meetings, found: &mut Found) {
 
 /// Joints that move no mass, which nothing can simulate.
 fn still(specimen: &Specimen, found: &mut Found) {
-    let mut file = specimen.file.clone();
-    let mut hand = specimen.hand.clone();
-    let angles = &specimen.nominal_rad[..specimen.joints()];
-    // Each turn gives one link a mass.
-    for _ in 0..specimen.joints() {
-        let Err(error) = moving_masses(&file, &hand, angles) else { return };
-        let number = error.key.split('.').nth(2).and_then(|number| number.parse::<usize>().ok());
-        let Some(joint) = number.and_then(|number| number.checked_sub(1)).filter(|k| *k < specimen.joints())
-        else {
-            return;
-        };
+    for joint in still_joints(&specimen.hand, &specimen.nominal_rad[..specimen.joints()]) {
         let remedy = "give its link, or one that it carries, a mass and an inertia";
         let what = "moves no mass: the hand can't be simulated";
-        found.push(specimen.on_joint(super::finding::Severity::Error, (joint, "mass_kg"), what, remedy));
-        let size = specimen.typical_bone_m();
-        let mass = 1.0_f64.max(file.joints.iter().map(|joint| joint.mass_kg).sum());
-        file.joints[joint].mass_kg = mass;
-        file.joints[joint].inertia_kg_m2.0 = vec![mass * size * size; 3];
-        let Ok(heavier) = file.kinematics() else { return };
-        hand = heavier;
+        found.push(specimen.on_joint(Severity::Error, (joint, "mass_kg"), what, remedy));
     }
 }
 
-/// Finds the faults that no rule knows of: a hand without errors is one that a firmware can be built with, gains or
-/// not.
-fn confirm(file: &HandFile, found: &mut Found) {
-    if found.findings.iter().any(|finding| finding.severity == super::finding::Severity::Error) {
+/// What no rule knows of: a hand without errors is one that a firmware can be built with, gains or not.
+fn confirm(specimen: &Specimen, found: &mut Found) {
+    let is_broken = found.findings.iter().any(|finding| finding.severity == Severity::Error);
+    if is_broken || specimen.file.control.is_none() {
         return;
     }
-    let refused = match &file.control {
-        Some(_) => HandModel::build(file).map(|_| ()),
-        None => file.prepare(&mut Vec::new()).map(|_| ()),
-    };
-    if let Err(error) = refused {
-        let subject = rules::numbers::subject_of(file, &error.key);
+    if let Err(error) = HandModel::of_prepared(&specimen.file, specimen.hand.clone()) {
+        let subject = rules::numbers::subject_of(&specimen.file, &error.key);
         found.refuse(error, subject);
     }
 }

@@ -3,7 +3,7 @@
 use super::super::super::check::Result;
 use super::super::super::error::SceneError;
 use super::super::super::file::HandFile;
-use super::super::super::hand::{moving_masses, posture};
+use super::super::super::hand::{posture, still_joints};
 use super::super::assembly::Assembly;
 use super::fingertips::Tip;
 use super::text::Draft;
@@ -110,13 +110,11 @@ impl Gains {
     /// Gains of a hand.
     pub(super) fn new(draft: &Draft<'_>, file: &HandFile, hand: &Hand) -> Result<Self> {
         let angles: Vec<f64> = draft.needs.iter().map(|needs| needs.nominal_rad).collect();
-        moving_masses(file, hand, &angles).map_err(|error| {
-            // The key has the joint's number, from 1: `hand.joint.2.mass_kg`.
-            let number = error.key.split('.').nth(2).and_then(|word| word.parse::<usize>().ok());
-            let index = number.and_then(|number| number.checked_sub(1)).unwrap_or(0);
+        if let Some(&k) = still_joints(hand, &angles).first() {
+            let problem = format!("joint `{}` moves no mass", file.joints[k].name);
             let remedy = "give the links that it moves an <inertial> in the URDF";
-            SceneError::new("", error.problem, remedy).at(&draft.joint(index).place)
-        })?;
+            return Err(SceneError::new("", problem, remedy).at(&draft.joint(k).place));
+        }
         let measures = Measures::new(draft, file, hand, &angles);
         let count = file.joints.len();
         let limits: Vec<f64> = (0..count)

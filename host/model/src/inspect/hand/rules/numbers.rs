@@ -3,8 +3,8 @@
 
 use super::super::found::Found;
 use super::length;
-use crate::HandFile;
 use crate::inspect::finding::{Finding, Severity};
+use crate::{HandFile, direction};
 use nalgebra::Vector3;
 use std::f64::consts::TAU;
 
@@ -40,13 +40,6 @@ pub(in super::super) fn axes(file: &HandFile, found: &mut Found) {
         };
         found.push(on_joint(file, Severity::Error, k, "axis", what, remedy));
     }
-}
-
-/// The unit vector along an axis, whatever length that has.
-pub(in super::super) fn direction(axis: [f64; 3]) -> Option<[f64; 3]> {
-    let axis = Vector3::from(axis);
-    // Squares of large numbers are none.
-    (axis / axis.amax()).try_normalize(0.0).filter(|axis| axis.iter().all(|v| v.is_finite())).map(Into::into)
 }
 
 /// The length of a vector; of one that is too large to be squared, that of its largest component.
