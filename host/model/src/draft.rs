@@ -1,19 +1,19 @@
 //! A scene whose files have been read, before its settings: so that it can be made with many settings, all from the same
 //! files.
 
-use super::error::{Notice, SceneError};
+use super::error::SceneError;
+use super::inspect::finding::Finding;
 use super::library::{self, Document, Kind};
 use super::tree::{Node, Setting};
-use super::{Place, Scene, SceneFile, build, read};
+use super::{Scene, SceneFile, build, open, read};
 use std::ffi::OsStr;
-use std::path::Path;
 
 /// A scene before its settings.
 #[derive(Clone, Debug)]
 pub struct Draft {
     tree: Node,
     /// The notices on its files.
-    notices: Vec<Notice>,
+    notices: Vec<Finding>,
 }
 
 impl Draft {
@@ -23,9 +23,7 @@ impl Draft {
     /// # Errors
     /// One line: where, which key, what is wrong, what to do.
     pub fn open(name_or_path: impl AsRef<OsStr>, settings: &[Setting]) -> Result<Self, SceneError> {
-        let document = Document::open(Kind::Scene, name_or_path.as_ref(), Path::new(""))
-            .map_err(|error| error.at(&Place::of_path(name_or_path.as_ref())))?;
-        Self::of(document, settings)
+        Self::of(open(Kind::Scene, name_or_path.as_ref())?, settings)
     }
 
     pub(super) fn of(document: Document, settings: &[Setting]) -> Result<Self, SceneError> {
@@ -52,7 +50,7 @@ impl Draft {
             let place = tree.place_of(&error.key).clone();
             error.at(&place)
         })?;
-        scene.warnings.splice(0..0, self.notices.iter().map(Notice::to_string));
+        scene.warnings.splice(0..0, self.notices.iter().map(|notice| notice.words(0)));
         Ok(scene)
     }
 

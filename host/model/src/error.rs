@@ -84,24 +84,6 @@ impl SceneError {
     }
 }
 
-/// A notice on something odd in a file that can be used all the same. One line: `file:line: what; remedy`.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Notice {
-    /// The place.
-    pub place: Place,
-    /// The oddity.
-    pub what: String,
-    /// The remedy.
-    pub remedy: String,
-}
-
-impl fmt::Display for Notice {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { place, what, remedy } = self;
-        f.write_str(&one_line(&format!("{place}: {what}; {remedy}")))
-    }
-}
-
 /// A text without control characters, cut where it is too long: keys and names come from files and may contain anything.
 pub(crate) fn one_line(text: &str) -> String {
     let mut clean = String::new();

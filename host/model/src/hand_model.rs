@@ -1,12 +1,13 @@
 //! A hand without a scene: what its firmware is built with.
 
-use super::Scene;
 use super::{
+    Scene,
     check::{Result, fail},
     controller::Setup,
-    error::{Notice, Place, SceneError, one_line},
+    error::{Place, SceneError, one_line},
     file::{Actuators, HandFile, JointFile, PlantSettings, Sensors},
     library::{Document, Kind, is_path},
+    open,
 };
 use blindgrasp_body::{Hand, MAX_JOINTS};
 use blindgrasp_shared::model;
@@ -49,12 +50,8 @@ impl HandModel {
     ///
     /// # Errors
     /// As [`Self::load`].
-    pub fn load_with_file(
-        name_or_path: impl AsRef<OsStr>,
-    ) -> std::result::Result<(Self, HandFile), SceneError> {
-        let whole = Place::of_path(name_or_path.as_ref());
-        let document = Document::open(Kind::Hand, name_or_path.as_ref(), Path::new(""));
-        Self::from_document(document.map_err(|error| error.at(&whole))?)
+    pub fn load_with_file(name_or_path: impl AsRef<OsStr>) -> std::result::Result<(Self, HandFile), SceneError> {
+        Self::from_document(open(Kind::Hand, name_or_path.as_ref())?)
     }
 
     /// The hand that a device has been built with, and its file: from `file`, if that is named, else among those built in. The
@@ -101,9 +98,11 @@ impl HandModel {
 
     /// Of a hand's file, with all that it says.
     pub(super) fn from_document(document: Document) -> std::result::Result<(Self, HandFile), SceneError> {
-        let (file, mut model, notices) = checked(document, Self::build)?;
-        model.warnings.splice(0..0, notices.iter().map(Notice::to_string));
-        Ok((model, file))
+        let (file, model, warnings) = checked(document, |file, warnings| {
+            let hand = file.prepare(warnings)?;
+            Self::of_prepared(file, hand)
+        })?;
+        Ok((Self { warnings, ..model }, file))
     }
 
     /// The hand of a scene, with the configuration of its own file.
@@ -175,27 +174,18 @@ impl HandFile {
     ///
     /// # Errors
     /// One line: where, which key, what is wrong, what to do.
-    pub fn load_checked(
-        name_or_path: impl AsRef<OsStr>,
-    ) -> std::result::Result<(Self, Hand, Vec<String>), SceneError> {
-        let document = Document::open(Kind::Hand, name_or_path.as_ref(), Path::new(""));
-        let document = document.map_err(|error| error.at(&Place::of_path(name_or_path.as_ref())))?;
-        let mut warnings = Vec::new();
-        let (file, hand, notices) = checked(document, |file| file.prepare(&mut warnings))?;
-        warnings.splice(0..0, notices.iter().map(Notice::to_string));
-        Ok((file, hand, warnings))
+    pub fn load_checked(name_or_path: impl AsRef<OsStr>) -> std::result::Result<(Self, Hand, Vec<String>), SceneError> {
+        checked(open(Kind::Hand, name_or_path.as_ref())?, Self::prepare)
     }
 }
 
-/// Reads a hand and checks it; what is wrong gets its place.
+/// Reads a hand and checks it; what is wrong gets its place. The warnings so far are those of reading it.
 fn checked<T>(
     document: Document,
-    check: impl FnOnce(&HandFile) -> Result<T>,
-) -> Result<(HandFile, T, Vec<Notice>)> {
+    check: impl FnOnce(&HandFile, &mut Vec<String>) -> Result<T>,
+) -> Result<(HandFile, T, Vec<String>)> {
     let (file, places) = HandFile::from_document(document)?;
-    let found = check(&file).map_err(|error| {
-        let place = places.of(&error.key);
-        error.at(&place)
-    })?;
-    Ok((file, found, places.notices))
+    let mut warnings = places.warnings();
+    let found = check(&file, &mut warnings).map_err(|error| places.locate(error))?;
+    Ok((file, found, warnings))
 }

@@ -37,6 +37,7 @@ use blindgrasp_shared::control::LawsConfig;
 use blindgrasp_shared::math::Real;
 use blindgrasp_shared::tick::Config;
 use controller::Setup;
+use inspect::finding::Finding;
 use library::{Document, Kind};
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 use std::ffi::OsStr;
@@ -46,7 +47,7 @@ use tree::Node;
 pub use draft::Draft;
 pub use equilibrium::equilibrium_indentations;
 pub(crate) use error::one_line;
-pub use error::{Notice, Place, SceneError, suggestion};
+pub use error::{Place, SceneError, suggestion};
 pub use file::{
     Actuators, Control, Friction, HandFile, ObjectFile, PlantSettings, Safety, SceneFile, Sensors,
 };
@@ -174,9 +175,7 @@ impl Scene {
     /// # Errors
     /// One line: where, which key, what is wrong, what to do.
     pub fn load(name_or_path: impl AsRef<OsStr>, settings: &[String]) -> Result<Self, SceneError> {
-        let document = Document::open(Kind::Scene, name_or_path.as_ref(), Path::new(""))
-            .map_err(|error| error.at(&Place::of_path(name_or_path.as_ref())))?;
-        Self::from_document(document, settings)
+        Self::from_document(open(Kind::Scene, name_or_path.as_ref())?, settings)
     }
 
     /// Reads a scene from a text. `source` is its name in errors; references are relative to `folder`.
@@ -269,13 +268,24 @@ impl HandFile {
 pub(crate) struct Places {
     tree: Node,
     /// Oddities of the file, or of what it names.
-    pub(crate) notices: Vec<Notice>,
+    pub(crate) notices: Vec<Finding>,
 }
 
 impl Places {
     /// The place of a key, or that of the nearest thing around it.
     pub(crate) fn of(&self, key: &str) -> Place {
         self.tree.place_of(key).clone()
+    }
+
+    /// An error with the place of its key.
+    fn locate(&self, error: SceneError) -> SceneError {
+        let place = self.of(&error.key);
+        error.at(&place)
+    }
+
+    /// The oddities in words.
+    fn warnings(&self) -> Vec<String> {
+        self.notices.iter().map(|notice| notice.words(0)).collect()
     }
 }
 
@@ -285,7 +295,7 @@ impl ObjectFile {
     /// # Errors
     /// What is wrong with the file as a file; a [`Scene`] checks the numbers.
     pub fn load(name_or_path: impl AsRef<OsStr>) -> Result<Self, SceneError> {
-        Self::load_with_notices(name_or_path).map(|(file, _)| file)
+        Self::load_with_places(name_or_path).map(|(file, _)| file)
     }
 
     /// Reads an object from a text. `source` is its name in errors; its mesh is relative to `folder`.
@@ -296,25 +306,14 @@ impl ObjectFile {
         read::read(&Document::parse(text, source, folder)?.complete_object(&mut Vec::new())?, "")
     }
 
-    /// As [`Self::load`], with what its mesh was repaired of.
-    ///
-    /// # Errors
-    /// As [`Self::load`].
-    pub fn load_with_notices(name_or_path: impl AsRef<OsStr>) -> Result<(Self, Vec<Notice>), SceneError> {
-        Self::load_with_places(name_or_path).map(|(file, places)| (file, places.notices))
-    }
-
     /// Loads an object and checks its numbers; with what is odd in it, in words.
     ///
     /// # Errors
     /// One line: where, which key, what is wrong, what to do.
     pub fn load_checked(name_or_path: impl AsRef<OsStr>) -> Result<(Self, Vec<String>), SceneError> {
         let (file, places) = Self::load_with_places(name_or_path)?;
-        let mut warnings: Vec<String> = places.notices.iter().map(Notice::to_string).collect();
-        file.body(&mut warnings).map_err(|error| {
-            let place = places.of(&error.key);
-            error.at(&place)
-        })?;
+        let mut warnings = places.warnings();
+        file.body(&mut warnings).map_err(|error| places.locate(error))?;
         Ok((file, warnings))
     }
 

@@ -1,7 +1,8 @@
 //! The origin of files: built into the program, or from the disk.
 
 use super::{
-    error::{Notice, Place, SceneError, suggestion},
+    error::{Place, SceneError, suggestion},
+    inspect::finding::Finding,
     mesh,
     tree::{Node, Setting, Value},
     urdf,
@@ -215,7 +216,7 @@ impl Document {
     pub(super) fn follow(
         mut self,
         settings: &[Setting],
-        notices: &mut Vec<Notice>,
+        notices: &mut Vec<Finding>,
     ) -> Result<Node, SceneError> {
         let of = |stage| settings.iter().filter(move |setting| Stage::of(&setting.key) == stage);
         for setting in of(Stage::Reference) {
@@ -251,14 +252,14 @@ impl Document {
     }
 
     /// An object's tree, with its mesh filled in.
-    pub(super) fn complete_object(self, notices: &mut Vec<Notice>) -> Result<Node, SceneError> {
+    pub(super) fn complete_object(self, notices: &mut Vec<Finding>) -> Result<Node, SceneError> {
         let Self { mut node, home } = self;
         mesh::expand(&mut node, &home, notices)?;
         Ok(node)
     }
 
     /// A hand's tree, with its URDF and its defaults filled in.
-    pub(super) fn complete_hand(self, notices: &mut Vec<Notice>) -> Result<Node, SceneError> {
+    pub(super) fn complete_hand(self, notices: &mut Vec<Finding>) -> Result<Node, SceneError> {
         let Self { mut node, home } = self;
         complete_hand(&mut node, &home, notices)?;
         Ok(node)
@@ -322,7 +323,7 @@ pub(super) fn is_path(name: &OsStr) -> bool {
 }
 
 /// Fills in a hand's URDF, and spreads its defaults.
-fn complete_hand(node: &mut Node, home: &Home, notices: &mut Vec<Notice>) -> Result<(), SceneError> {
+fn complete_hand(node: &mut Node, home: &Home, notices: &mut Vec<Finding>) -> Result<(), SceneError> {
     node.spread_defaults("fingertip");
     urdf::expand(node, home, notices)?;
     node.spread_defaults("joint");

@@ -1,7 +1,7 @@
 //! A finding: one line that says how bad, where, about what, what is wrong, and what to do; and the list of them, with the
 //! verdict that follows from it.
 
-use crate::{Place, one_line};
+use crate::{Place, SceneError, one_line};
 use serde::ser::{Serialize, SerializeStruct, Serializer};
 use std::fmt;
 
@@ -70,6 +70,11 @@ impl Finding {
         }
     }
 
+    /// A notice on something odd in a file that can be used all the same.
+    pub(crate) fn notice(place: &Place, what: impl Into<String>, remedy: impl Into<String>) -> Self {
+        Self::new(Severity::Notice, what, remedy).at(place.clone())
+    }
+
     /// The same, about something.
     #[must_use]
     pub fn about(self, subject: impl Into<String>) -> Self {
@@ -95,10 +100,22 @@ impl fmt::Display for Finding {
     }
 }
 
+impl From<SceneError> for Finding {
+    fn from(error: SceneError) -> Self {
+        let SceneError { place, key, problem, remedy } = error;
+        Self { place, ..Self::new(Severity::Error, problem, remedy).key(key) }
+    }
+}
+
 impl Finding {
     /// The line, for this and so many other subjects.
     fn line(&self, others: usize) -> String {
-        let mut line = format!("{}: ", self.severity);
+        format!("{}: {}", self.severity, self.words(others))
+    }
+
+    /// The line without its severity.
+    pub(crate) fn words(&self, others: usize) -> String {
+        let mut line = String::new();
         if let Some(place) = &self.place {
             line += &format!("{place}: ");
         }

@@ -36,10 +36,11 @@ mod unit;
 mod weld;
 
 use super::check::{Result, within};
-use super::error::{Notice, Place, SceneError, suggestion};
+use super::error::{Place, SceneError, suggestion};
 use super::file::{FileKey, ShapeFile};
+use super::inspect::finding::Finding;
 use super::library::Home;
-use super::tree::{Entry, Node, Value};
+use super::tree::{Node, Value};
 use repair::{Repaired, repair};
 use soup::{Problem, Soup};
 use std::ffi::OsStr;
@@ -71,11 +72,11 @@ const LONGEST_EXCERPT: usize = 60;
 const REPAIRED: &str = "it is used as repaired";
 
 /// Puts vertices and triangles in the place of the mesh file that an object names, if it does; notices say what was repaired.
-pub(super) fn expand(object: &mut Node, home: &Home, notices: &mut Vec<Notice>) -> Result<()> {
+pub(super) fn expand(object: &mut Node, home: &Home, notices: &mut Vec<Finding>) -> Result<()> {
     let Some(mesh) = object.get_mut("shape").and_then(|shape| shape.get_mut("mesh")) else {
         return Ok(());
     };
-    let Some(entry) = take(mesh, "file") else { return Ok(()) };
+    let Some(entry) = mesh.take("file") else { return Ok(()) };
     let place = entry.place;
     let key = |name: &str| format!("shape.mesh.{name}");
     let fail = |name: &str, problem: String, remedy: String, place: &Place| {
@@ -89,7 +90,7 @@ pub(super) fn expand(object: &mut Node, home: &Home, notices: &mut Vec<Notice>) 
             return fail(given, "is given beside a file".into(), "leave one out".into(), &place);
         }
     }
-    let scale = match take(mesh, "scale") {
+    let scale = match mesh.take("scale") {
         None => 1.0,
         Some(entry) => {
             let value = match entry.node.value {
@@ -103,7 +104,7 @@ pub(super) fn expand(object: &mut Node, home: &Home, notices: &mut Vec<Notice>) 
             value
         }
     };
-    let unit = take(mesh, "unit");
+    let unit = mesh.take("unit");
     let of_file = |problem: Problem| {
         SceneError::new(key("file"), format!("`{file}`: {}", problem.what), problem.remedy).at(&place)
     };
@@ -123,7 +124,6 @@ pub(super) fn expand(object: &mut Node, home: &Home, notices: &mut Vec<Notice>) 
         }
     };
     let mesh_of = body(soup, unit, scale).map_err(of_file)?;
-    let Value::Table(entries) = &mut mesh.value else { return Ok(()) };
     let node = |value| Node { value, place: place.clone() };
     let list = |items: Vec<Value>| node(Value::Array(items.into_iter().map(node).collect()));
     let vertices =
@@ -134,29 +134,18 @@ pub(super) fn expand(object: &mut Node, home: &Home, notices: &mut Vec<Notice>) 
         .map(|corners| list(corners.iter().map(|k| Value::Integer(*k as i64)).collect()))
         .collect();
     for (name, items) in [("vertices_m", vertices), ("triangles", triangles)] {
-        let node = node(Value::Array(items));
-        entries.push(Entry { key: name.into(), place: place.clone(), node });
+        mesh.insert(name, node(Value::Array(items)));
     }
-    notices.extend(mesh_of.notices.into_iter().map(|notice| Notice {
-        place: place.clone(),
-        what: format!("`{file}`: {notice}"),
-        remedy: REPAIRED.to_owned(),
-    }));
+    let notice = |what: String| Finding::notice(&place, format!("`{file}`: {what}"), REPAIRED);
+    notices.extend(mesh_of.notices.into_iter().map(notice));
     Ok(())
-}
-
-/// Takes an entry out of a table.
-fn take(table: &mut Node, key: &str) -> Option<Entry> {
-    let Value::Table(entries) = &mut table.value else { return None };
-    let index = entries.iter().position(|entry| entry.key == key)?;
-    Some(entries.remove(index))
 }
 
 /// Reads a mesh file alone, for an object whose file is still to be written; and says what had to be repaired.
 ///
 /// # Errors
 /// One line: which file, what is wrong, what to do.
-pub fn load(path: &OsStr, unit: Option<Unit>) -> Result<(ShapeFile, Vec<Notice>)> {
+pub fn load(path: &OsStr, unit: Option<Unit>) -> Result<(ShapeFile, Vec<Finding>)> {
     let place = Place::of_path(path);
     let of_file = |problem: Problem| SceneError::new("", problem.what, problem.remedy).at(&place);
     let soup = parse(path, &Home::Folder(PathBuf::new()), &place).map_err(of_file)?;
@@ -165,7 +154,7 @@ pub fn load(path: &OsStr, unit: Option<Unit>) -> Result<(ShapeFile, Vec<Notice>)
         return Err(of_file(Problem::new("a mesh file does not say its unit", remedy)));
     };
     let Repaired { vertices, triangles, notices } = body(soup, unit, 1.0).map_err(of_file)?;
-    let notice = |what| Notice { place: place.clone(), what, remedy: REPAIRED.to_owned() };
+    let notice = |what: String| Finding::notice(&place, what, REPAIRED);
     let shape = ShapeFile::mesh(vertices.into_iter().map(Into::into).collect(), triangles);
     Ok((shape, notices.into_iter().map(notice).collect()))
 }

@@ -125,16 +125,16 @@ fn wavefront_exact((vertices, triangles): &Mesh) -> Vec<u8> {
 
 #[test]
 fn shipped_meshes_are_what_their_files_say() {
-    let (file, notices) = ObjectFile::load_with_notices("octahedron").unwrap();
-    assert_eq!(notices, []);
+    let (file, places) = ObjectFile::load_with_places("octahedron").unwrap();
+    assert_eq!(places.notices, []);
     let body = object::polyhedron(&file.shape).unwrap();
     assert_eq!((body.vertices_m.len(), body.faces.len()), (6, 8));
     // a^3 sqrt(2) / 3.
     let volume = 0.05f64.powi(3) * std::f64::consts::SQRT_2 / 3.0;
     assert!((body.mass_properties().volume_m3 / volume - 1.0).abs() < 1e-14);
 
-    let (file, notices) = ObjectFile::load_with_notices("l-bracket").unwrap();
-    assert_eq!(notices, []);
+    let (file, places) = ObjectFile::load_with_places("l-bracket").unwrap();
+    assert_eq!(places.notices, []);
     let body = object::polyhedron(&file.shape).unwrap();
     assert_eq!((body.vertices_m.len(), body.faces.len()), (12, 8));
     let volume = (48.0 * 20.0 + 28.0 * 20.0) * 40.0 * 1e-9;

@@ -5,7 +5,8 @@
 //! link that they hang on; their masses become one body.
 
 use super::super::check::{Result, fail};
-use super::super::error::{Notice, SceneError, suggestion};
+use super::super::error::{SceneError, suggestion};
+use super::super::inspect::finding::Finding;
 use super::body::Body;
 use super::keys::Keys;
 use super::robot::{Joint, Kind, Robot};
@@ -63,7 +64,7 @@ impl Assembly {
         tree: &Tree,
         keys: &Keys,
         fingertips: &[usize],
-        notices: &mut Vec<Notice>,
+        notices: &mut Vec<Finding>,
     ) -> Result<Self> {
         let mut moves_fingertip = vec![false; robot.joints.len()];
         for &link in fingertips {
@@ -328,24 +329,21 @@ pub(crate) fn toml_key(name: &str) -> String {
 }
 
 /// Links that move, have an extent, and weigh nothing. Links of joints that share a place are points.
-fn tell_massless(robot: &Robot, joints: &[Moving]) -> Vec<Notice> {
+fn tell_massless(robot: &Robot, joints: &[Moving]) -> Vec<Finding> {
     let has_extent =
         |k: usize| joints.iter().any(|other| other.parent == Some(k) && other.offset_m != [0.0; 3]);
     let massless = joints.iter().enumerate().filter(|(k, moving)| moving.body.is_none() && has_extent(*k));
     massless
         .map(|(_, moving)| {
             let link = &robot.links[robot.joints[moving.joint].child];
-            Notice {
-                place: link.place.clone(),
-                what: format!("link `{}` moves and has no mass", quote(&link.name)),
-                remedy: "add <inertial>, unless its mass is counted in another link".into(),
-            }
+            let what = format!("link `{}` moves and has no mass", quote(&link.name));
+            Finding::notice(&link.place, what, "add <inertial>, unless its mass is counted in another link")
         })
         .collect()
 }
 
 /// Joints that could move, but move no fingertip.
-fn tell_idle(robot: &Robot, idle: &[usize]) -> Option<Notice> {
+fn tell_idle(robot: &Robot, idle: &[usize]) -> Option<Finding> {
     let joints: Vec<&Joint> = idle.iter().map(|&k| &robot.joints[k]).collect();
     let (first, (names, verb)) = (joints.first()?, subject(&joints));
     let moves = if verb == "is" { "moves" } else { "move" };
@@ -354,9 +352,6 @@ fn tell_idle(robot: &Robot, idle: &[usize]) -> Option<Notice> {
     } else {
         "zero or the limit nearest to it"
     };
-    Some(Notice {
-        place: first.place.clone(),
-        what: format!("{names} {moves} no fingertip and {verb} held still at {at}"),
-        remedy: "say where with locked_rad (or locked_m) in [urdf]".into(),
-    })
+    let what = format!("{names} {moves} no fingertip and {verb} held still at {at}");
+    Some(Finding::notice(&first.place, what, "say where with locked_rad (or locked_m) in [urdf]"))
 }

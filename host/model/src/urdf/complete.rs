@@ -3,7 +3,8 @@
 //! A key comes from the joint's own `[[joint]]`, else from the URDF, else from `[joint_defaults]`.
 
 use super::super::check::Result;
-use super::super::error::{Notice, Place, SceneError};
+use super::super::error::{Place, SceneError};
+use super::super::inspect::finding::Finding;
 use super::super::tree::{Node, Value};
 use super::expand::Parts;
 use super::robot::{Joint, Kind};
@@ -16,10 +17,10 @@ pub(super) const PLACEHOLDER: f64 = 1000.0;
 
 /// Oddities of the joints: many have the same, which is told of the first.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Oddities(Vec<(&'static str, Notice, usize)>);
+pub(super) struct Oddities(Vec<(&'static str, Finding, usize)>);
 
 impl Oddities {
-    fn extend(&mut self, kind: &'static str, notice: Option<Notice>) {
+    fn extend(&mut self, kind: &'static str, notice: Option<Finding>) {
         let Some(notice) = notice else { return };
         match self.0.iter_mut().find(|(other, ..)| *other == kind) {
             Some((.., count)) => *count += 1,
@@ -28,11 +29,11 @@ impl Oddities {
     }
 
     /// One notice a kind.
-    pub(super) fn notices(self) -> impl Iterator<Item = Notice> {
+    pub(super) fn notices(self) -> impl Iterator<Item = Finding> {
         self.0.into_iter().map(|(_, notice, count)| match count {
             1 => notice,
-            2 => Notice { what: notice.what + " (and so it is with another joint)", ..notice },
-            _ => Notice {
+            2 => Finding { what: notice.what + " (and so it is with another joint)", ..notice },
+            _ => Finding {
                 what: format!("{} (and so it is with {} more joints)", notice.what, count - 1),
                 ..notice
             },
@@ -162,12 +163,9 @@ fn set_range(
     let [lower, upper] = match (joint.kind, joint.limit.lower, joint.limit.upper) {
         (Kind::Continuous, ..) | (_, None, None) if is_default(key) => return Ok(()),
         (Kind::Continuous, ..) => {
-            let notice = Notice {
-                place: joint.place.clone(),
-                what: format!("{} is continuous: its limits are taken as -pi and pi", of(joint)),
-                remedy: format!("give `{key}` in its [[joint]]"),
-            };
-            oddities.extend("continuous", Some(notice));
+            let what = format!("{} is continuous: its limits are taken as -pi and pi", of(joint));
+            let remedy = format!("give `{key}` in its [[joint]]");
+            oddities.extend("continuous", Some(Finding::notice(&joint.place, what, remedy)));
             [-PI, PI]
         }
         (_, None, None) => return Err(lacking(joint, "no limits", key).at(place)),
@@ -187,16 +185,15 @@ fn set_range(
     Ok(())
 }
 
-fn placeholder(joint: &Joint, key: &str, attribute: &str, value: f64, unit: &str) -> Option<Notice> {
-    (value >= PLACEHOLDER).then(|| Notice {
-        place: joint.limit.place.clone(),
-        what: format!("{}: {attribute} of {value:?} {unit} looks like a placeholder", of(joint)),
-        remedy: format!("if so, give `{key}` in [joint_defaults] and `ignore = [\"{attribute}\"]` in [urdf]"),
-    })
+fn placeholder(joint: &Joint, key: &str, attribute: &str, value: f64, unit: &str) -> Option<Finding> {
+    let what = format!("{}: {attribute} of {value:?} {unit} looks like a placeholder", of(joint));
+    let remedy =
+        format!("if so, give `{key}` in [joint_defaults] and `ignore = [\"{attribute}\"]` in [urdf]");
+    (value >= PLACEHOLDER).then(|| Finding::notice(&joint.limit.place, what, remedy))
 }
 
 /// Friction of the URDF that the motor can't overcome: it holds still, or never comes near its speed.
-fn too_much_friction(node: &Node, joint: &Joint) -> Option<Notice> {
+fn too_much_friction(node: &Node, joint: &Joint) -> Option<Finding> {
     let number = |key: &str| match node.get(key) {
         Some(Node { value: Value::Float(value), place }) => Some((*value, place)),
         _ => None,
@@ -214,11 +211,8 @@ fn too_much_friction(node: &Node, joint: &Joint) -> Option<Notice> {
         }
         _ => return None,
     };
-    Some(Notice {
-        place: joint.dynamics.place.clone(),
-        what: format!("{}: {what}", of(joint)),
-        remedy: "if it is a placeholder, add `ignore = [\"friction\", \"damping\"]` to [urdf]".into(),
-    })
+    let remedy = "if it is a placeholder, add `ignore = [\"friction\", \"damping\"]` to [urdf]";
+    Some(Finding::notice(&joint.dynamics.place, format!("{}: {what}", of(joint)), remedy))
 }
 
 /// Moments and products as a hand's file has them.

@@ -1,8 +1,9 @@
 //! From a URDF to the entries of a hand.
 
 use super::super::check::{Result, fail, item};
-use super::super::error::{Notice, Place, SceneError, suggestion};
+use super::super::error::{Place, SceneError, suggestion};
 use super::super::file::FingertipFile;
+use super::super::inspect::finding::Finding;
 use super::super::library::Home;
 use super::super::read::read;
 use super::super::tree::{Entry, Node, Value};
@@ -23,7 +24,7 @@ pub(crate) fn file_of(hand: &Node) -> Option<&Node> {
 ///
 /// # Errors
 /// What is wrong with the URDF, in the URDF; or with the hand's file, there.
-pub(crate) fn expand(hand: &mut Node, home: &Home, notices: &mut Vec<Notice>) -> Result<()> {
+pub(crate) fn expand(hand: &mut Node, home: &Home, notices: &mut Vec<Finding>) -> Result<()> {
     let Some(Entry { place, node: table, .. }) = hand.take("urdf") else { return Ok(()) };
     let keys: Keys = read(&table, "urdf")?;
     let at_key = |error: SceneError| {
@@ -110,7 +111,7 @@ impl Parts<'_> {
     }
 
     /// The array `joint`: in its own order if it is there, else in the tree's.
-    fn add_joints(&self, hand: &mut Node, notices: &mut Vec<Notice>) -> Result<()> {
+    fn add_joints(&self, hand: &mut Node, notices: &mut Vec<Finding>) -> Result<()> {
         let count = self.assembly.joints.len();
         let entries = match hand.take("joint") {
             None => self.in_tree_order(),

@@ -14,7 +14,7 @@ mod strength;
 mod tests;
 mod text;
 
-use super::finding::{Counts, Finding, Findings, Severity, Verdict};
+use super::finding::{Counts, Findings, Severity, Verdict};
 use crate::{Examined, HandFile, HandModel, Places, SceneError, still_joints};
 use blindgrasp_body::{Hand, MAX_JOINTS};
 use found::Found;
@@ -97,9 +97,7 @@ impl HandCheck {
             let place = places.of(&finding.key);
             finding.at(place)
         }));
-        findings.extend(places.notices.iter().map(|notice| {
-            Finding::new(Severity::Notice, &notice.what, &notice.remedy).at(notice.place.clone())
-        }));
+        findings.extend(places.notices.iter().cloned());
         findings.sort();
         Self {
             joints: facts::joints(&file, specimen),

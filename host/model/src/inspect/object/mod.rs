@@ -9,7 +9,7 @@ mod text;
 use super::finding::{Counts, Finding, Findings, Severity, Verdict};
 use crate::file::{SCHEMA, ShapeFile};
 use crate::mesh::{self, Unit};
-use crate::{Notice, ObjectBody, ObjectFile, Place, SceneError};
+use crate::{ObjectBody, ObjectFile, Place, SceneError};
 use blindgrasp_body::polyhedron::{Polyhedron, bounds_m, diagonal_m};
 use blindgrasp_shared::math::{Real, norm};
 use boxes::Boxes;
@@ -125,61 +125,44 @@ impl ObjectCheck {
         let loaded = if is_mesh {
             mesh::load(name_or_path, wanted.unit).map(|(shape, notices)| Self {
                 name: stem(name_or_path),
-                ..Self::of(&bare(shape), &notices, &whole, wanted)
+                ..Self::of(&bare(shape), notices, &whole, wanted)
             })
         } else {
-            ObjectFile::load_with_places(name_or_path).map(|(file, places)| {
-                let mut check = Self::of(&file, &places.notices, &whole, wanted);
+            ObjectFile::load_with_places(name_or_path).map(|(file, mut places)| {
+                let mut check = Self::of(&file, std::mem::take(&mut places.notices), &whole, wanted);
                 check.findings.locate(|key| places.of(key));
                 check
             })
         };
-        match loaded {
-            Ok(check) => Ok(check),
+        loaded.or_else(|error| {
             // The file is there and its unit is known: what is wrong is in its triangles.
-            Err(error)
-                if is_mesh && wanted.unit.is_some() && std::path::Path::new(name_or_path).is_file() =>
-            {
-                Ok(Self::refused(stem(name_or_path), error))
+            let is_there = is_mesh && wanted.unit.is_some() && std::path::Path::new(name_or_path).is_file();
+            if is_there || error.key == "shape.mesh.file" {
+                Ok(Self::without_body(stem(name_or_path), String::new(), vec![error.into()]))
+            } else {
+                Err(error)
             }
-            Err(error) if error.key == "shape.mesh.file" => Ok(Self::refused(stem(name_or_path), error)),
-            Err(error) => Err(error),
-        }
+        })
     }
 
-    fn refused(name: String, error: SceneError) -> Self {
-        let mut findings = Findings::default();
-        let SceneError { place, key, problem, remedy } = error;
-        findings.push(Finding { place, ..Finding::new(Severity::Error, problem, remedy).key(key) });
-        Self {
-            name,
-            description: String::new(),
-            verdict: findings.verdict(),
-            counts: findings.counts(),
-            body: None,
-            faces: Vec::new(),
-            findings,
-            shape: None,
-        }
+    fn without_body(name: String, description: String, findings: Vec<Finding>) -> Self {
+        let mut all = Findings::default();
+        all.extend(findings);
+        all.sort();
+        let (verdict, counts) = (all.verdict(), all.counts());
+        Self { name, description, verdict, counts, body: None, faces: Vec::new(), findings: all, shape: None }
     }
 
-    /// Looks at an object; its file is called `place` in findings.
-    pub fn of(file: &ObjectFile, notices: &[Notice], place: &Place, wanted: &Wanted) -> Self {
-        let mut findings = Findings::default();
-        findings.extend(notices.iter().map(|Notice { place, what, remedy }| {
-            Finding::new(Severity::Notice, what.clone(), remedy.clone()).at(place.clone())
-        }));
+    /// Looks at an object; its file is called `place` in findings, before which come those that are known.
+    pub fn of(file: &ObjectFile, mut known: Vec<Finding>, place: &Place, wanted: &Wanted) -> Self {
         let mut warnings = Vec::new();
-        let body = match file.body(&mut warnings) {
-            Ok(body) => body,
-            Err(error) => {
-                let mut check = Self::refused(file.name.clone(), error.at(place));
-                findings.extend(check.findings);
-                (check.counts, check.verdict, check.findings) =
-                    (findings.counts(), findings.verdict(), findings);
-                return Self { description: file.description.clone(), ..check };
-            }
+        let (body, refused) = file.examine(&mut warnings);
+        known.extend(refused.into_iter().map(|error| error.at(place).into()));
+        let Some(body) = body else {
+            return Self::without_body(file.name.clone(), file.description.clone(), known);
         };
+        let mut findings = Findings::default();
+        findings.extend(known);
         let about =
             |severity, what: String, remedy: &str| Finding::new(severity, what, remedy).at(place.clone());
         findings.extend(

@@ -13,7 +13,7 @@ fn check(mesh: &Mesh) -> ObjectCheck {
 }
 
 fn check_for(mesh: &Mesh, fingertip_m: Option<f64>) -> ObjectCheck {
-    ObjectCheck::of(&file(mesh), &[], &Place::whole("part.toml"), &Wanted { unit: None, fingertip_m })
+    ObjectCheck::of(&file(mesh), Vec::new(), &Place::whole("part.toml"), &Wanted { unit: None, fingertip_m })
 }
 
 fn findings(check: &ObjectCheck) -> Vec<String> {
@@ -153,4 +153,25 @@ fn what_is_no_body_is_an_error() {
             .starts_with("error: part.toml: it is not closed: 3 open edges, the first at triangle ")
     );
     assert!(check.text().contains("broken: 1 error"));
+}
+
+#[test]
+fn all_that_is_wrong_is_told() {
+    let mut object = ObjectFile { schema: 2, name: String::new(), ..file(&bracket()) };
+    object.density_kg_m3 = Some(-1.0);
+    object.inertia_kg_m2 = Some(crate::file::InertiaFile(vec![1.0; 4]));
+    let check = ObjectCheck::of(&object, Vec::new(), &Place::whole("part.toml"), &Wanted::default());
+    assert_eq!(
+        findings(&check),
+        [
+            "error: part.toml: 2 is a format that this program does not know; write it as format 1",
+            "error: part.toml: is no name; has to be a word of at most 100 bytes, without control characters",
+            "error: part.toml: -1.0 is out of range; has to be between 0.001 and 100000.0",
+            "error: part.toml: has 4 items; has to be [xx, yy, zz] or [xx, yy, zz, xy, xz, yz]",
+        ]
+    );
+    assert_eq!(
+        check.findings.iter().map(|finding| finding.key.as_str()).collect::<Vec<_>>(),
+        ["schema", "name", "density_kg_m3", "inertia_kg_m2"]
+    );
 }
