@@ -28,7 +28,7 @@ impl Folder {
         std::fs::write(self.0.join("hand.urdf"), urdf).expect("a file");
         let path = self.0.join("hand.toml");
         std::fs::write(&path, toml).expect("a file");
-        match HandFile::load_checked(&path.to_string_lossy()) {
+        match HandFile::load_checked(&path) {
             Ok((file, hand, _)) => (file, hand),
             Err(error) => panic!("{error}\n{toml}\n{urdf}"),
         }

@@ -241,7 +241,7 @@ fn scenes_know_no_difference() {
     std::fs::write(folder.path("scene.toml"), scene).unwrap();
     let load = |settings: &[&str]| {
         let settings: Vec<String> = settings.iter().map(|setting| setting.to_string()).collect();
-        Scene::load(&folder.path("scene.toml"), &settings)
+        Scene::load(folder.path("scene.toml"), &settings)
     };
     let scene = load(&["hand.joint.left-base.mass_kg=0.5"]).unwrap();
     assert_eq!(scene.hand.link(0).mass_kg, 0.5);
@@ -272,9 +272,9 @@ fn scenes_know_no_difference() {
 #[test]
 fn the_files_of_a_hand_are_known_also_when_they_are_wrong() {
     let folder = Folder::new(HAND, b"nonsense");
-    let files = HandModel::files(&folder.path("hand.toml"));
+    let files = HandModel::files(folder.path("hand.toml"));
     assert_eq!(files, [folder.0.join("hand.toml"), folder.0.join("gripper.urdf")]);
     std::fs::write(folder.path("hand.toml"), "nonsense").unwrap();
-    assert_eq!(HandModel::files(&folder.path("hand.toml")), [folder.0.join("hand.toml")]);
+    assert_eq!(HandModel::files(folder.path("hand.toml")), [folder.0.join("hand.toml")]);
     assert_eq!(HandModel::files("three-finger"), Vec::<PathBuf>::new());
 }

@@ -86,7 +86,7 @@ fn load(toml: &str, urdf: &str) -> Result<Loaded, String> {
 
 fn load_bytes(toml: &str, urdf: &[u8]) -> Result<Loaded, String> {
     let folder = Folder::new(toml, urdf);
-    match HandFile::load_checked(&folder.path("hand.toml")) {
+    match HandFile::load_checked(folder.path("hand.toml")) {
         Ok((file, hand, warnings)) => {
             let warnings = warnings.iter().map(|words| folder.plain(words)).collect();
             Ok((file, hand, warnings))

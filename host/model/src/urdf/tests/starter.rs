@@ -24,7 +24,7 @@ fn refused(urdf: &str, change: impl Fn(&mut StarterRequest)) -> String {
 fn read(folder: &Folder, starter: &Starter) -> HandFile {
     std::fs::write(folder.path("hand.toml"), &starter.text).unwrap();
     let (model, file) =
-        HandModel::load_with_file(&folder.path("hand.toml")).unwrap_or_else(|error| panic!("{error}"));
+        HandModel::load_with_file(folder.path("hand.toml")).unwrap_or_else(|error| panic!("{error}"));
     assert_eq!(model.warnings, Vec::<String>::new());
     file
 }
