@@ -4,13 +4,15 @@
 //! and then instead, so that a hand is stopped, processes end and recordings are finished on this way out, too.
 
 use blindgrasp_files as files;
-use std::sync::atomic::{AtomicU32, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use std::sync::{Mutex, Once, PoisonError};
 
 /// An answer to an interrupt, which is given its number from 1 on.
 type Action = Box<dyn Fn(u32) + Send>;
 
 static COUNT: AtomicU32 = AtomicU32::new(0);
+/// Set by an interrupt of a command that [listens](listen).
+static WANTED: AtomicBool = AtomicBool::new(false);
 static ACTION: Mutex<Option<Action>> = Mutex::new(None);
 static LISTENING: Once = Once::new();
 
@@ -21,16 +23,17 @@ pub fn tidy_up() {
     }
 }
 
-/// From now on, an interrupt is not the end of the process but is remembered. A second one is.
+/// From now on, an interrupt is not the end of the process but of whatever waits for a device ([`wanted`]). A second one is.
 pub fn listen() {
     listen_by(|number| {
+        WANTED.store(true, Ordering::Relaxed);
         if number > 1 {
             end_now();
         }
     });
 }
 
-/// From now on, this is done at an interrupt.
+/// From now on, this is done at an interrupt, and nothing else: the line stays open, so that a hand can be stopped over it.
 pub fn listen_by(action: impl Fn(u32) + Send + 'static) {
     *ACTION.lock().unwrap_or_else(PoisonError::into_inner) = Some(Box::new(action));
     LISTENING.call_once(|| {
@@ -49,9 +52,9 @@ pub fn count() -> u32 {
     COUNT.load(Ordering::Relaxed)
 }
 
-/// Returns `true` if the user wants an end.
+/// Returns `true` if the user wants an end of a command that [listens](listen).
 pub fn wanted() -> bool {
-    count() > 0
+    WANTED.load(Ordering::Relaxed)
 }
 
 /// Ends the process, and removes what is half written.

@@ -50,7 +50,9 @@ impl HandModel {
     ///
     /// # Errors
     /// As [`Self::load`].
-    pub fn load_with_file(name_or_path: impl AsRef<OsStr>) -> std::result::Result<(Self, HandFile), SceneError> {
+    pub fn load_with_file(
+        name_or_path: impl AsRef<OsStr>,
+    ) -> std::result::Result<(Self, HandFile), SceneError> {
         Self::from_document(open(Kind::Hand, name_or_path.as_ref())?)
     }
 
@@ -174,7 +176,9 @@ impl HandFile {
     ///
     /// # Errors
     /// One line: where, which key, what is wrong, what to do.
-    pub fn load_checked(name_or_path: impl AsRef<OsStr>) -> std::result::Result<(Self, Hand, Vec<String>), SceneError> {
+    pub fn load_checked(
+        name_or_path: impl AsRef<OsStr>,
+    ) -> std::result::Result<(Self, Hand, Vec<String>), SceneError> {
         checked(open(Kind::Hand, name_or_path.as_ref())?, Self::prepare)
     }
 }

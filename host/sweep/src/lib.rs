@@ -9,7 +9,7 @@
 //! where the grasp begins to fail ([`edges`]); [`draw`] makes a picture. Files are [`Output`]'s and the [`Journal`]'s.
 //!
 //! ```no_run
-//! use blindgrasp::sweep::{Axis, Plan, run};
+//! use blindgrasp_sweep::{Axis, Plan, run};
 //!
 //! let axis = Axis::parse("control.attitude_stiffness_nm=1e-4..1e-1:31:log")?;
 //! let plan = Plan::new("cube-ideal", Vec::new(), vec![axis], 1)?;

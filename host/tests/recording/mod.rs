@@ -12,12 +12,15 @@ mod simulation;
 
 use std::process::Command;
 
-/// Runs a test of this file once more, in a process of its own and under limits that a shell sets, and returns what it
+/// Runs a test of this folder once more, in a process of its own and under limits that a shell sets, and returns what it
 /// printed. In that process, [`is_limited`] is true.
 fn run_limited(limits: &str, test: &str) -> String {
     let program = std::env::current_exe().unwrap();
     let output = Command::new("sh")
-        .args(["-c", &format!("{limits}; exec \"$0\" --exact {test} --nocapture --test-threads 1")])
+        .args([
+            "-c",
+            &format!("{limits}; exec \"$0\" --exact recording::{test} --nocapture --test-threads 1"),
+        ])
         .arg(program)
         .env("RECORDING_LIMITED", "1")
         .output()

@@ -311,7 +311,7 @@ fn references_are_relative_to_the_file() {
     let a_folder = folder.join("parts").to_str().unwrap().to_string();
     assert_eq!(
         load(&a_folder, &[]).unwrap_err().to_string(),
-        format!("{a_folder}: not a file; name a .toml file")
+        format!("{a_folder}: it is a folder, not a file; name a .toml file")
     );
     let large = write("large.toml", &vec![b'#'; 33 << 20]);
     assert_eq!(

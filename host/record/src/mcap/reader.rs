@@ -147,6 +147,7 @@ impl Recording {
             Some(span) => Some(span),
             None => span_of_chunks(&mut file).map_err(unreadable)?,
         };
+        channels.sort();
         Ok(Self { path: path.into(), library, channels, span, summary, ticks: false })
     }
 
@@ -251,6 +252,21 @@ impl Channels {
         self.by_name.insert(name.to_owned(), self.names.len());
         self.names.push(name.to_owned());
         self.names.len() - 1
+    }
+
+    /// Brings the devices into the order of their channels: that in which they were named, whichever answered first.
+    fn sort(&mut self) {
+        let lowest = |device: usize| {
+            let own = self.known.iter().filter(|(_, (of, _))| *of == device);
+            own.map(|(&number, _)| number).min().unwrap_or(u16::MAX)
+        };
+        let mut order: Vec<usize> = (0..self.names.len()).collect();
+        order.sort_by_key(|&device| lowest(device));
+        self.names = order.iter().map(|&device| self.names[device].clone()).collect();
+        self.by_name = self.names.iter().cloned().zip(0..).collect();
+        for (device, _) in self.known.values_mut() {
+            *device = order.iter().position(|before| before == device).unwrap_or(*device);
+        }
     }
 
     /// Takes the channels of the device that a message's twin is about, and gives the message.

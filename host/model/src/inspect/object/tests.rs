@@ -165,7 +165,7 @@ fn all_that_is_wrong_is_told() {
         findings(&check),
         [
             "error: part.toml: 2 is a format that this program does not know; write it as format 1",
-            "error: part.toml: is no name; has to be a word of at most 100 bytes, without control characters",
+            "error: part.toml: is not a name; has to be a word of at most 100 bytes, without control characters",
             "error: part.toml: -1.0 is out of range; has to be between 0.001 and 100000.0",
             "error: part.toml: has 4 items; has to be [xx, yy, zz] or [xx, yy, zz, xy, xz, yz]",
         ]

@@ -16,7 +16,7 @@ fn errors_in_the_hand_s_file_name_it() {
         (
             "file = \"gripper.urdf\"",
             "file = \".\"",
-            "hand.toml:4: urdf.file: `.`: not a file; name a .urdf file",
+            "hand.toml:4: urdf.file: `.`: it is a folder, not a file; name a .urdf file",
         ),
         (
             "file = \"gripper.urdf\"",
