@@ -256,17 +256,19 @@ impl Channels {
 
     /// Brings the devices into the order of their channels: that in which they were named, whichever answered first.
     fn sort(&mut self) {
-        let lowest = |device: usize| {
-            let own = self.known.iter().filter(|(_, (of, _))| *of == device);
-            own.map(|(&number, _)| number).min().unwrap_or(u16::MAX)
-        };
+        let mut lowest = vec![u16::MAX; self.names.len()];
+        for (&number, &(device, _)) in &self.known {
+            lowest[device] = lowest[device].min(number);
+        }
         let mut order: Vec<usize> = (0..self.names.len()).collect();
-        order.sort_by_key(|&device| lowest(device));
+        order.sort_by_key(|&device| lowest[device]);
+        let mut place = vec![0; order.len()];
+        for (now, &before) in order.iter().enumerate() {
+            place[before] = now;
+        }
         self.names = order.iter().map(|&device| self.names[device].clone()).collect();
         self.by_name = self.names.iter().cloned().zip(0..).collect();
-        for (device, _) in self.known.values_mut() {
-            *device = order.iter().position(|before| before == device).unwrap_or(*device);
-        }
+        self.known.values_mut().for_each(|(device, _)| *device = place[*device]);
     }
 
     /// Takes the channels of the device that a message's twin is about, and gives the message.
