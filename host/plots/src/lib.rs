@@ -1,4 +1,4 @@
-//! Curves and maps: of a run ([`write`]), of a sweep ([`sweep`]), and of anything else ([`Figure`]).
+//! Curves and maps: of a run ([`write()`]), of a sweep ([`sweep`]), and of anything else ([`Figure`]).
 
 mod axes;
 mod backend;
