@@ -201,7 +201,7 @@ mod with_probes {
             &["flash", "nowhere/hand", "--dry-run"],
             &["cannot read the image nowhere/hand"],
         );
-        assert_refused(&folder, &["flash", "/", "--dry-run"], &["/ is not an image"]);
+        assert_refused(&folder, &["flash", "/", "--dry-run"], &["cannot read the image /: it is a folder"]);
         let default = default_chip();
         // Without its package, and then without its flash.
         let family = default.strip_suffix("Tx").expect("a package");
