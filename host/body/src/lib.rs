@@ -1,10 +1,13 @@
-//! Rigid bodies and what they are made of: the hand with its [`dynamics`], [`polyhedron`], fingertips and joints. Nothing
-//! moves here: that is the plant's.
+//! Rigid bodies and what they are made of: the hand with its [`dynamics`] and [`inverse_kinematics`], [`polyhedron`], fingertips
+//! and joints. Nothing moves here: that is the plant's.
 
 pub mod dynamics;
+mod equilibrium;
+pub mod inverse_kinematics;
 mod parts;
 pub mod polyhedron;
 
+pub use equilibrium::equilibrium_indentations;
 pub use parts::{FaceContact, FingertipModel, JointFriction, Push};
 
 /// The largest hand that the host loads: joints.

@@ -12,13 +12,11 @@ mod build;
 mod check;
 mod controller;
 mod draft;
-mod equilibrium;
 mod error;
 pub mod file;
 mod hand;
 mod hand_model;
 pub mod inspect;
-pub mod inverse_kinematics;
 mod library;
 pub mod mesh;
 mod object;
@@ -45,7 +43,6 @@ use std::path::Path;
 use tree::Node;
 
 pub use draft::Draft;
-pub use equilibrium::equilibrium_indentations;
 pub(crate) use error::one_line;
 pub use error::{Place, SceneError, suggestion};
 pub use file::{

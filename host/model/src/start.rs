@@ -3,15 +3,12 @@
 use super::{
     Start,
     check::{Result, all_within, fail, item, within},
-    equilibrium::equilibrium_indentations,
     error::{SceneError, suggestion},
     file::{Indentation, JointFile, PoseFile, SceneFile},
     hand::{posture, rotation},
-    inverse_kinematics,
 };
-use blindgrasp_body::FaceContact;
-use blindgrasp_body::Hand;
 use blindgrasp_body::polyhedron::Polyhedron;
+use blindgrasp_body::{FaceContact, Hand, equilibrium_indentations, inverse_kinematics};
 use nalgebra::{Matrix3, Quaternion, UnitQuaternion, Vector3};
 
 /// Largest distance of a contact point from its face, m; closer, it is moved onto the face.

@@ -33,7 +33,7 @@ use super::facet::Facet;
 use super::position::ROOM_RAD;
 use super::rolling::{Coordinates, Gains, Rolling};
 use super::stance::room;
-use blindgrasp_model::inverse_kinematics::own_joints;
+use blindgrasp_body::inverse_kinematics::own_joints;
 use blindgrasp_model::{Scene, posture};
 use blindgrasp_shared::math::{Real, norm};
 use nalgebra::{Matrix3, Vector3};
@@ -110,7 +110,7 @@ impl Quality {
         let stiffnesses: Vec<f64> =
             scene.fingertips.iter().map(|fingertip| fingertip.stiffness_n_m2).collect();
         let points = &scene.start.points_m;
-        let indentations = blindgrasp_model::equilibrium_indentations(
+        let indentations = blindgrasp_body::equilibrium_indentations(
             points,
             &inwards,
             &radii,

@@ -5,8 +5,8 @@
 //! the powers of the generalised golden ratio (M. Roberts' R sequence): the same on every machine. Joints that move several
 //! fingertips (a trunk) stay where they are.
 
+use blindgrasp_body::inverse_kinematics::own_joints;
 use blindgrasp_body::{Hand, MAX_FINGERS, MAX_JOINTS, Posture};
-use blindgrasp_model::inverse_kinematics::own_joints;
 use blindgrasp_model::{Parts, SceneError, SceneFile};
 use nalgebra::Vector3;
 

@@ -254,7 +254,7 @@ impl Words<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use blindgrasp_model::inverse_kinematics::Unreachable;
+    use blindgrasp_body::inverse_kinematics::Unreachable;
     use blindgrasp_model::{Parts, Scene};
 
     /// Every way in which a posture can't be taken has words.

@@ -8,8 +8,9 @@ use super::refusal::{Count, Words};
 use super::stance::{self, Miss, Stance};
 use super::task::Task;
 use super::{NARROWEST, NoPlacement, Placement, Refusal, Request};
+use blindgrasp_body::equilibrium_indentations;
 use blindgrasp_model::file::{ContactFile, Indentation, PoseFile, SceneFile};
-use blindgrasp_model::{Scene, SceneError, equilibrium_indentations};
+use blindgrasp_model::{Scene, SceneError};
 use nalgebra::{UnitQuaternion, Vector3};
 
 /// Positions that are tried for an arrangement.

@@ -1,9 +1,9 @@
 //! A placement that is tried: whether the fingers can take it exactly, without being in each other's way or in the object's.
 
 use super::position::FACING;
+use blindgrasp_body::inverse_kinematics::{Unreachable, own_joints, place};
 use blindgrasp_body::polyhedron::Polyhedron;
 use blindgrasp_body::{Hand, Posture};
-use blindgrasp_model::inverse_kinematics::{Unreachable, own_joints, place};
 use blindgrasp_model::posture;
 use nalgebra::{UnitQuaternion, Vector3};
 

@@ -2,6 +2,8 @@
 
 mod damage;
 mod hand_models;
+mod inverse_kinematics;
+mod mesh;
 mod refusals;
 
 use super::*;

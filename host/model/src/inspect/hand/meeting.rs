@@ -7,7 +7,8 @@
 
 use super::reach::{Angles, Sense, random_angles, sweep};
 use super::specimen::Specimen;
-use crate::{inverse_kinematics, posture};
+use crate::posture;
+use blindgrasp_body::inverse_kinematics;
 use nalgebra::Vector3;
 
 /// Starts for a ball and a set of fingertips: the nominal posture, and random ones.

@@ -1,8 +1,8 @@
 //! The hand under inspection, as the rules see it.
 
 use crate::inspect::finding::{Finding, Severity};
-use crate::inverse_kinematics::is_trunk;
 use crate::{HandFile, posture};
+use blindgrasp_body::inverse_kinematics::is_trunk;
 use blindgrasp_body::{Hand, MAX_JOINTS, Posture};
 use nalgebra::Vector3;
 

@@ -1,7 +1,5 @@
 //! `object check`: what an object is, whether it can be used, and what is likely a mistake.
 
-mod boxes;
-mod crossing;
 #[cfg(test)]
 mod tests;
 mod text;
@@ -11,9 +9,8 @@ use crate::file::{SCHEMA, ShapeFile};
 use crate::mesh::{self, Unit};
 use crate::{ObjectBody, ObjectFile, Place, SceneError};
 use blindgrasp_body::polyhedron::{Polyhedron, bounds_m, diagonal_m};
+use blindgrasp_mesh::{Boxes, crossings};
 use blindgrasp_shared::math::{Real, norm};
-use boxes::Boxes;
-use crossing::crossings;
 use nalgebra::{SymmetricEigen, Vector3};
 use serde::Serialize;
 use std::ffi::OsStr;
@@ -240,17 +237,7 @@ fn body_facts(file: &ObjectFile, body: &ObjectBody, corners: &[[usize; 3]], boxe
     let edges = shape.faces.iter().flat_map(|face| face.edges());
     let shortest =
         edges.map(|(a, b)| norm(&(shape.vertices_m[a] - shape.vertices_m[b]))).fold(f64::INFINITY, f64::min);
-    let mut thinnest = (f64::INFINITY, Vector3::zeros());
-    for (k, [a, b, c]) in boxes.triangles.iter().enumerate() {
-        let area = (b - a).cross(&(c - a));
-        let middle = (a + b + c) / 3.0;
-        if norm(&area) > 0.0 {
-            let wall = boxes.first(&middle, &(-area / norm(&area)), k);
-            if wall < thinnest.0 {
-                thinnest = (wall, middle);
-            }
-        }
-    }
+    let (thinnest_wall_m, thinnest_wall_at_m) = boxes.thinnest_wall_m();
     let above =
         |face: &blindgrasp_body::polyhedron::Face, k: &Vector3<f64>| face.normal.dot(k) - face.distance_m;
     let level = 1e-6 * diagonal_m(&shape.vertices_m);
@@ -276,8 +263,8 @@ fn body_facts(file: &ObjectFile, body: &ObjectBody, corners: &[[usize; 3]], boxe
         principal_moments_per_kg_m2: order.map(|k| eigen.eigenvalues[k]),
         principal_axes: order.map(|k| eigen.eigenvectors.column(k).into_owned().into()),
         shortest_edge_m: shortest,
-        thinnest_wall_m: thinnest.0,
-        thinnest_wall_at_m: thinnest.1.into(),
+        thinnest_wall_m,
+        thinnest_wall_at_m: thinnest_wall_at_m.into(),
     }
 }
 

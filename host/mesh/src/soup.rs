@@ -4,20 +4,23 @@ use nalgebra::Vector3;
 
 /// A fault of a file, and the remedy.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(super) struct Problem {
-    pub(super) what: String,
-    pub(super) remedy: String,
+pub struct Problem {
+    /// What is wrong, with its place in the file.
+    pub what: String,
+    /// What to do.
+    pub remedy: String,
 }
 
 impl Problem {
-    pub(super) fn new(what: impl Into<String>, remedy: impl Into<String>) -> Self {
+    /// Makes one.
+    pub fn new(what: impl Into<String>, remedy: impl Into<String>) -> Self {
         Self { what: what.into(), remedy: remedy.into() }
     }
 }
 
 /// Triangles in the unit of the file, and the number of each in the file, from 0.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub(super) struct Soup {
+pub struct Soup {
     pub(super) triangles: Vec<[Vector3<f64>; 3]>,
     pub(super) numbers: Vec<u32>,
 }
@@ -39,8 +42,8 @@ impl Soup {
         }
     }
 
-    /// Extents along x, y and z.
-    pub(super) fn size(&self) -> Vector3<f64> {
+    /// Returns the extents along x, y and z.
+    pub fn size(&self) -> Vector3<f64> {
         let Some(start) = self.triangles.first().map(|corners| corners[0]) else { return Vector3::zeros() };
         let all = self.triangles.iter().flatten();
         let (low, high) = all.fold((start, start), |(low, high), p| (low.inf(p), high.sup(p)));

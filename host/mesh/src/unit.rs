@@ -45,7 +45,7 @@ impl Unit {
     }
 
     /// Returns the size of something in each unit, for whoever has to choose one.
-    pub(super) fn choices(size: &Vector3<f64>, how: impl Fn(&str) -> String) -> String {
+    pub fn choices(size: &Vector3<f64>, how: impl Fn(&str) -> String) -> String {
         let choices = Self::ALL.map(|unit| {
             let [x, y, z] = [size.x, size.y, size.z].map(|length| short(unit.metres(length) * 1e3));
             format!("{} if it measures {x} x {y} x {z} mm", how(unit.word()))

@@ -1,15 +1,15 @@
 //! The most that is read. Everything is counted before room is made for it.
 
-pub(super) use blindgrasp_body::polyhedron::MAX_TRIANGLES;
+pub use blindgrasp_body::polyhedron::MAX_TRIANGLES;
 
 /// Bytes of a file: an ASCII STL file takes about 260 a triangle.
-pub(super) const LARGEST_FILE: u64 = 64 << 20;
+pub const LARGEST_FILE: u64 = 64 << 20;
 /// Bytes of a line that holds a vertex.
-pub(super) const LONGEST_LINE: usize = 1000;
+pub(crate) const LONGEST_LINE: usize = 1000;
 /// Corners of a polygon.
-pub(super) const MAX_CORNERS: usize = 1000;
+pub(crate) const MAX_CORNERS: usize = 1000;
 /// Looks from a corner of a polygon at another while the polygons of a file are cut into triangles. A usual polygon takes the
 /// square of its corners, one that winds up to the cube; this takes half a second.
-pub(super) const MOST_LOOKS: u64 = 100_000_000;
+pub(crate) const MOST_LOOKS: u64 = 100_000_000;
 /// The remedy for a file with too much in it.
-pub(super) const COARSER: &str = "export it with coarser tolerances: a grasp needs its faces, not its finish";
+pub(crate) const COARSER: &str = "export it with coarser tolerances: a grasp needs its faces, not its finish";

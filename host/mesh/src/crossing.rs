@@ -6,7 +6,7 @@
 //! corner of the other triangle, which happens where parts are symmetric; not so where the two have a corner in common, since
 //! a sliver's edge may well run through its own corner. Parts that lie on one another in one plane are not found.
 
-use super::boxes::Boxes;
+use crate::boxes::Boxes;
 use nalgebra::Vector3;
 use robust::{Coord3D, orient3d};
 
@@ -14,17 +14,17 @@ use robust::{Coord3D, orient3d};
 const MOST_PAIRS: usize = 20_000_000;
 
 /// Places where a surface cuts through itself.
-pub(super) struct Crossings {
+pub struct Crossings {
     /// Pairs of triangles.
-    pub(super) count: usize,
+    pub count: usize,
     /// The first two triangles, in the order of their numbers.
-    pub(super) first: Option<[usize; 2]>,
+    pub first: Option<[usize; 2]>,
     /// `true` if all of them were looked for.
-    pub(super) is_complete: bool,
+    pub is_complete: bool,
 }
 
 /// Looks for them.
-pub(super) fn crossings(boxes: &Boxes, corners: &[[usize; 3]]) -> Crossings {
+pub fn crossings(boxes: &Boxes, corners: &[[usize; 3]]) -> Crossings {
     let (mut count, mut first) = (0, None::<[usize; 2]>);
     let is_complete = boxes.pairs(MOST_PAIRS, |a, b| {
         if cross([a, b], boxes, corners) {

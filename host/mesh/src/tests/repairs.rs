@@ -4,7 +4,7 @@ use super::*;
 use blindgrasp_meshes::{Numbers, grid_box};
 
 /// The bracket after a change to its triangles.
-fn changed(change: impl FnOnce(&mut Mesh)) -> std::result::Result<Repaired, Problem> {
+fn changed(change: impl FnOnce(&mut Mesh)) -> Result<Repaired, Problem> {
     let mut mesh = bracket();
     change(&mut mesh);
     read("b.stl", &binary(&mesh))
@@ -22,7 +22,7 @@ fn assert_repaired(repaired: &Repaired, notices: &[&str]) {
     }
 }
 
-fn refused(result: std::result::Result<Repaired, Problem>) -> String {
+fn refused(result: Result<Repaired, Problem>) -> String {
     result.expect_err("has to be refused").what
 }
 
@@ -231,14 +231,9 @@ fn random_hulls_come_back_from_a_file() {
         }
         numbers.shuffle(&mut mesh.1);
         let repaired = read("h.stl", &binary(&mesh)).unwrap();
-        let body = object::polyhedron(&ShapeFile::Mesh {
-            vertices_m: repaired.vertices.iter().map(|&v| v.into()).collect(),
-            triangles: repaired.triangles,
-            // Points on a ball make triangles, some of which are nearly in one plane.
-            flat_deg: 0.0,
-            flat_m: Some(0.0),
-        })
-        .unwrap();
+        // Points on a ball make triangles, some of which are nearly in one plane.
+        let exact = Flatness { angle_rad: 0.0, distance_m: 0.0 };
+        let body = Polyhedron::mesh(&repaired.vertices, &repaired.triangles, &exact).unwrap();
         assert_eq!(body.faces.len(), hull.faces.len());
         for (k, face) in hull.faces.iter().enumerate() {
             // Coordinates of a decimetre are rounded at 4 nm in an STL, and noise is 20 nm: what is wider than a millimetre

@@ -1,13 +1,15 @@
 //! A tree of boxes around triangles: which triangles are near one another, and what a ray meets first.
 
+use blindgrasp_shared::math::norm;
 use nalgebra::Vector3;
 
 /// Triangles in a leaf.
 const LEAF: usize = 4;
 
 /// The triangles of a surface, in a binary tree of boxes along the axes.
-pub(super) struct Boxes {
-    pub(super) triangles: Vec<[Vector3<f64>; 3]>,
+pub struct Boxes {
+    /// The triangles' corners, m.
+    pub triangles: Vec<[Vector3<f64>; 3]>,
     /// Indices of the triangles, those of a node side by side.
     order: Vec<u32>,
     nodes: Vec<Node>,
@@ -30,7 +32,8 @@ impl Node {
 }
 
 impl Boxes {
-    pub(super) fn around(triangles: Vec<[Vector3<f64>; 3]>) -> Self {
+    /// Puts triangles into boxes.
+    pub fn around(triangles: Vec<[Vector3<f64>; 3]>) -> Self {
         let mut boxes = Self { order: (0..triangles.len() as u32).collect(), triangles, nodes: Vec::new() };
         if !boxes.triangles.is_empty() {
             boxes.split(0, boxes.triangles.len());
@@ -88,6 +91,23 @@ impl Boxes {
             }
         }
         true
+    }
+
+    /// Returns the thickness of the thinnest wall, from the middle of each triangle straight inwards to the surface opposite, and
+    /// that middle. Infinite where there are no triangles.
+    pub fn thinnest_wall_m(&self) -> (f64, Vector3<f64>) {
+        let mut thinnest = (f64::INFINITY, Vector3::zeros());
+        for (k, [a, b, c]) in self.triangles.iter().enumerate() {
+            let area = (b - a).cross(&(c - a));
+            let middle = (a + b + c) / 3.0;
+            if norm(&area) > 0.0 {
+                let wall = self.first(&middle, &(-area / norm(&area)), k);
+                if wall < thinnest.0 {
+                    thinnest = (wall, middle);
+                }
+            }
+        }
+        thinnest
     }
 
     /// Distance along a ray to the first triangle that it meets, but for the one that it starts on.

@@ -1,8 +1,8 @@
 //! Closes what should be closed: cracks between vertices that are nearly the same, and edges that end in the middle of another
 //! (T-junctions). Holes stay: nobody knows what was there.
 
-use super::repair::{Mesh, length};
-use super::weld::weld;
+use crate::repair::{Mesh, length};
+use crate::weld::weld;
 use blindgrasp_body::polyhedron::counted;
 use blindgrasp_body::polyhedron::surface::{Survey, end, origin, survey};
 use blindgrasp_shared::math::norm;

@@ -44,9 +44,8 @@ fn damaged_files_never_panic() {
         match read(name, &bytes) {
             Ok(repaired) => {
                 read_anyway += 1;
-                let vertices = repaired.vertices.iter().map(|&v| v.into()).collect();
                 // What it is after that, a body or a refusal, is no panic either.
-                let _ = object::polyhedron(&ShapeFile::mesh(vertices, repaired.triangles));
+                let _ = faces(&repaired);
             }
             Err(Problem { what, remedy }) => {
                 refused += 1;
@@ -110,13 +109,10 @@ fn the_largest_files_are_read_in_time() {
             let read = read(format, &bytes);
             let reading = start.elapsed().as_secs_f64();
             let outcome = match &read {
-                Ok(repaired) => {
-                    let vertices = repaired.vertices.iter().map(|&v| v.into()).collect();
-                    match object::polyhedron(&ShapeFile::mesh(vertices, repaired.triangles.clone())) {
-                        Ok(body) => format!("{} faces", body.faces.len()),
-                        Err(error) => error.to_string(),
-                    }
-                }
+                Ok(repaired) => match faces(repaired) {
+                    Ok(body) => format!("{} faces", body.faces.len()),
+                    Err(error) => error.to_string(),
+                },
                 Err(problem) => problem.what.clone(),
             };
             let whole = start.elapsed().as_secs_f64();

@@ -1,8 +1,8 @@
 //! From triangles as a file has them to a closed, oriented surface; what had to be done for that, in words.
 
-use super::cracks;
-use super::soup::Soup;
-use super::weld::{distinct, weld};
+use crate::cracks;
+use crate::soup::Soup;
+use crate::weld::{distinct, weld};
 use blindgrasp_body::polyhedron::surface::{NONE, Survey, origin, survey};
 use blindgrasp_body::polyhedron::{MeshFault, counted, diagonal_m};
 use nalgebra::Vector3;
@@ -21,10 +21,13 @@ pub(super) struct Mesh {
 
 /// The repaired surface.
 #[derive(Debug)]
-pub(super) struct Repaired {
-    pub(super) vertices: Vec<Vector3<f64>>,
-    pub(super) triangles: Vec<[usize; 3]>,
-    pub(super) notices: Vec<String>,
+pub struct Repaired {
+    /// Its vertices, m.
+    pub vertices: Vec<Vector3<f64>>,
+    /// The vertices of each triangle, counterclockwise from outside.
+    pub triangles: Vec<[usize; 3]>,
+    /// What was repaired, in words.
+    pub notices: Vec<String>,
 }
 
 /// Repairs what can be repaired without a guess, and refuses the rest.

@@ -5,9 +5,9 @@
 //! texture coordinates are not needed, and their indices would overflow it in a debug build. It would cut polygons into fans,
 //! which is wrong where they are not convex; so it leaves them whole, and they are cut here.
 
-use super::limits::{COARSER, LONGEST_LINE, MAX_CORNERS, MAX_TRIANGLES, MOST_LOOKS};
-use super::polygon::triangles;
-use super::soup::{Problem, Soup};
+use crate::limits::{COARSER, LONGEST_LINE, MAX_CORNERS, MAX_TRIANGLES, MOST_LOOKS};
+use crate::polygon::triangles;
+use crate::soup::{Problem, Soup};
 use nalgebra::Vector3;
 use std::io::{self, BufRead, Read};
 use tobj::{LoadError, LoadOptions};

@@ -10,8 +10,8 @@
 //!   solids may be missing; several solids are read as one.
 //! - What is neither is a binary file that was cut off, or no STL file.
 
-use super::limits::{COARSER, LONGEST_LINE, MAX_TRIANGLES};
-use super::soup::{Problem, Soup};
+use crate::limits::{COARSER, LONGEST_LINE, MAX_TRIANGLES};
+use crate::soup::{Problem, Soup};
 use nalgebra::Vector3;
 use std::io::Cursor;
 

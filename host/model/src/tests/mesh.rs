@@ -1,70 +1,24 @@
-//! Mesh files: the same body in each format, what is shipped, what an object's file may say of them.
+//! Objects whose shape is a mesh file: what is shipped, and what an object's file may say of its mesh.
 
-mod damage;
-mod formats;
-mod repairs;
-
-use super::*;
+use crate::file::ShapeFile;
+use crate::mesh::{Unit, load};
 use crate::{ObjectFile, Scene, object};
-use blindgrasp_body::polyhedron::Polyhedron;
-use blindgrasp_meshes::{Mesh, bracket, icosphere, plate};
-use nalgebra::Vector3;
+use blindgrasp_meshes::{Mesh, bracket};
+use std::path::{Path, PathBuf};
 
 const OBJECT: &str = "schema = 1\nname = \"part\"\ndensity_kg_m3 = 20\n[shape.mesh]\n";
 
-fn binary(mesh: &Mesh) -> Vec<u8> {
-    let mut bytes = Vec::new();
-    stl_io::write_stl(&mut bytes, facets(mesh).iter()).unwrap();
-    bytes
-}
-
-/// The triangles in millimetres. A mesh file does not need normals that are right, and these are not.
-fn facets((vertices, triangles): &Mesh) -> Vec<stl_io::Triangle> {
-    let vertex = |k: usize| stl_io::Vertex::new((vertices[k] * 1e3).map(|v| v as f32).into());
-    let normal = stl_io::Normal::new([0.0; 3]);
-    triangles.iter().map(|corners| stl_io::Triangle { normal, vertices: corners.map(vertex) }).collect()
-}
-
-fn ascii(mesh: &Mesh) -> Vec<u8> {
+/// As an ASCII STL file, in millimetres.
+fn stl((vertices, triangles): &Mesh) -> String {
     let mut text = "solid part\n".to_owned();
-    for facet in facets(mesh) {
-        text += "  facet normal 0 0 0\n    outer loop\n";
-        for vertex in facet.vertices {
-            text += &format!("      vertex {} {} {}\n", vertex.0[0], vertex.0[1], vertex.0[2]);
+    for corners in triangles {
+        text += "facet normal 0 0 0\nouter loop\n";
+        for corner in corners.map(|k| vertices[k] * 1e3) {
+            text += &format!("vertex {} {} {}\n", corner.x, corner.y, corner.z);
         }
-        text += "    endloop\n  endfacet\n";
+        text += "endloop\nendfacet\n";
     }
-    (text + "endsolid part\n").into_bytes()
-}
-
-/// With the coordinates that STL leaves of them.
-fn wavefront((vertices, triangles): &Mesh) -> Vec<u8> {
-    let mut text = "mtllib nowhere.mtl\no part\n".to_owned();
-    for vertex in vertices {
-        let [x, y, z] = (vertex * 1e3).map(|v| f64::from(v as f32)).into();
-        text += &format!("v {x} {y} {z}\n");
-    }
-    for [a, b, c] in triangles {
-        text += &format!("f {} {} {}\n", a + 1, b + 1, c + 1);
-    }
-    text.into_bytes()
-}
-
-/// Reads a file of this name and content.
-fn read(name: &str, bytes: &[u8]) -> std::result::Result<Repaired, Problem> {
-    let soup = if name.ends_with("stl") { stl::read(bytes.to_vec()) } else { obj::read(bytes.to_vec()) };
-    body(soup?, Unit::Millimetre, 1.0)
-}
-
-/// The same, as one line.
-fn refusal(name: &str, bytes: &[u8]) -> String {
-    let Problem { what, remedy } = read(name, bytes).expect_err("has to be refused");
-    format!("{what}; {remedy}")
-}
-
-fn polyhedron(repaired: &Repaired) -> Polyhedron {
-    let vertices = repaired.vertices.iter().map(|&vertex| vertex.into()).collect();
-    object::polyhedron(&ShapeFile::mesh(vertices, repaired.triangles.clone())).unwrap()
+    text + "endsolid part\n"
 }
 
 /// A new folder for the files of a test.
@@ -72,55 +26,6 @@ fn folder(name: &str) -> PathBuf {
     let folder = std::env::temp_dir().join(format!("blindgrasp-mesh-{name}-{}", std::process::id()));
     std::fs::create_dir_all(&folder).unwrap();
     folder
-}
-
-/// The octahedron with edges of 50 mm, its corners on the axes.
-fn octahedron() -> Mesh {
-    use blindgrasp_shared::math::Real;
-    let reach = 0.050 / 2f64.square_root();
-    let vertices = [
-        [1.0, 0.0, 0.0],
-        [0.0, 1.0, 0.0],
-        [-1.0, 0.0, 0.0],
-        [0.0, -1.0, 0.0],
-        [0.0, 0.0, 1.0],
-        [0.0, 0.0, -1.0],
-    ];
-    let mut triangles = Vec::new();
-    for k in 0..4 {
-        triangles.extend([[k, (k + 1) % 4, 4], [(k + 1) % 4, k, 5]]);
-    }
-    (vertices.iter().map(|v| Vector3::from(*v) * reach).collect(), triangles)
-}
-
-/// The bracket that is shipped: arms of 48 mm, 20 mm thick, 40 mm wide.
-fn l_bracket() -> Mesh {
-    let (mut vertices, triangles) = bracket();
-    for vertex in &mut vertices {
-        let longer = |v: f64| if v > 0.03 { 0.048 } else { v };
-        *vertex = Vector3::new(longer(vertex.x), longer(vertex.y), vertex.z / 0.03 * 0.04);
-    }
-    (vertices, triangles)
-}
-
-/// `BLESS=1 cargo test -p blindgrasp --lib shipped_meshes` writes them.
-#[test]
-fn shipped_meshes_are_made_here() {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../models/objects");
-    let head = b"# A regular octahedron with edges of 50, corners on the axes.\n";
-    let octahedron = [head.to_vec(), wavefront_exact(&octahedron())].concat();
-    for (name, bytes) in [("l-bracket.stl", binary(&l_bracket())), ("octahedron.obj", octahedron)] {
-        if std::env::var_os("BLESS").is_some() {
-            std::fs::write(folder.join(name), &bytes).unwrap();
-        }
-        assert!(std::fs::read(folder.join(name)).unwrap() == bytes, "{name} is not what the test makes");
-    }
-}
-
-fn wavefront_exact((vertices, triangles): &Mesh) -> Vec<u8> {
-    let lines = vertices.iter().map(|v| format!("v {} {} {}\n", v.x * 1e3, v.y * 1e3, v.z * 1e3));
-    let faces = triangles.iter().map(|[a, b, c]| format!("f {} {} {}\n", a + 1, b + 1, c + 1));
-    lines.chain(faces).collect::<String>().into_bytes()
 }
 
 #[test]
@@ -147,7 +52,7 @@ fn a_scene_with_a_mesh_needs_no_file() {
     let folder = folder("scene");
     std::fs::create_dir_all(folder.join("parts")).unwrap();
     let (vertices, triangles) = blindgrasp_meshes::grid_box([0.048; 3], 3);
-    std::fs::write(folder.join("parts/Block.STL"), binary(&(vertices, triangles))).unwrap();
+    std::fs::write(folder.join("parts/Block.STL"), stl(&(vertices, triangles))).unwrap();
     std::fs::write(
         folder.join("parts/block.toml"),
         OBJECT.to_owned() + "file = \"Block.STL\"\nunit = \"mm\"\n",
@@ -190,7 +95,7 @@ fn a_scene_with_a_mesh_needs_no_file() {
 #[test]
 fn what_an_object_says_of_its_mesh_is_checked() {
     let folder = folder("keys");
-    std::fs::write(folder.join("part.stl"), binary(&bracket())).unwrap();
+    std::fs::write(folder.join("part.stl"), stl(&bracket())).unwrap();
     std::fs::write(folder.join("part.step"), b"ISO-10303-21;").unwrap();
     let path = folder.join("part.toml");
     let message = |lines: &str| {
@@ -284,7 +189,7 @@ fn units_and_scales_give_metres() {
     }
     let folder = folder("units");
     let path = folder.join("part.stl");
-    std::fs::write(&path, binary(&bracket())).unwrap();
+    std::fs::write(&path, stl(&bracket())).unwrap();
     let size = |unit| match load(path.as_os_str(), Some(unit)).unwrap().0 {
         ShapeFile::Mesh { vertices_m, .. } => vertices_m.iter().map(|v| v[0]).fold(0.0, f64::max),
         _ => 0.0,

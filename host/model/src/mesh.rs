@@ -1,39 +1,5 @@
 //! Bodies from mesh files: `[shape.mesh]` of an object with `file`, `unit` and `scale` becomes one with vertices and
 //! triangles in metres, so that everything behind it, also a recording or a scene that was written, needs no file.
-//!
-//! ```text
-//! file (.stl, .obj) -> triangles, each for itself -> metres -> vertices welded -> repaired -> vertices, triangles -> faces
-//! ```
-//!
-//! The last step is [`Polyhedron::mesh`](blindgrasp_body::polyhedron::Polyhedron::mesh); it is the same for triangles that
-//! stand in the file of an object. What is repaired, and what is not:
-//!
-//! | what | how |
-//! |---|---|
-//! | vertices within 1e-6 of the body's diagonal of another | welded; a notice, if they were not the same to the bit |
-//! | triangles without area, or there twice | left out; a notice |
-//! | triangles turned against their neighbours, or a body inside out | turned over; a notice |
-//! | cracks: open edges whose vertices are within 1e-4 of the diagonal | welded; a notice |
-//! | open edges with a neighbour's vertex in their middle | cut there; a notice |
-//! | slivers | kept: they take the face beside them |
-//! | other open edges; edges of three triangles; several parts; one-sided surfaces; no volume | refused, with the place |
-//! | a surface that cuts through itself | read; `object check` finds it |
-//!
-//! Tolerances are lengths in comparison with the diagonal of the box around the body; nothing else hangs on exact
-//! arithmetic: that a surface is closed and which way it is turned follows from the numbers of its vertices alone. Everything
-//! is bounded before room is made for it (`limits`), and takes `n log n` steps.
-
-mod cracks;
-mod limits;
-mod obj;
-mod polygon;
-mod repair;
-mod soup;
-mod stl;
-#[cfg(test)]
-mod tests;
-mod unit;
-mod weld;
 
 use super::check::{Result, within};
 use super::error::{Place, SceneError, suggestion};
@@ -41,12 +7,11 @@ use super::file::{FileKey, ShapeFile};
 use super::inspect::finding::Finding;
 use super::library::Home;
 use super::tree::{Node, Value};
-use repair::{Repaired, repair};
-use soup::{Problem, Soup};
+use blindgrasp_mesh::{Format, Problem, Repaired, Soup, body, limits, parse};
 use std::ffi::OsStr;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
-pub use unit::Unit;
+pub use blindgrasp_mesh::Unit;
 
 /// The keys of `[shape.mesh]` that stand for vertices and triangles.
 pub const FILE_KEYS: [FileKey; 3] = [
@@ -61,12 +26,6 @@ pub const FILE_KEYS: [FileKey; 3] = [
 
 /// The least and the greatest factor on the lengths of a mesh file.
 const SCALES: [f64; 2] = [1e-6, 1e6];
-
-/// No body has a vertex farther than this from the origin, m.
-const FARTHEST_M: f64 = 1e6;
-
-/// The most that is quoted of a file in an error, characters.
-const LONGEST_EXCERPT: usize = 60;
 
 /// The remedy for what was repaired.
 const REPAIRED: &str = "it is used as repaired";
@@ -108,7 +67,7 @@ pub(super) fn expand(object: &mut Node, home: &Home, notices: &mut Vec<Finding>)
     let of_file = |problem: Problem| {
         SceneError::new(key("file"), format!("`{file}`: {}", problem.what), problem.remedy).at(&place)
     };
-    let soup = parse(file.as_ref(), home, &entry.node.place).map_err(of_file)?;
+    let soup = read(file.as_ref(), home, &entry.node.place).map_err(of_file)?;
     let unit = match unit.as_ref().map(|entry| (&entry.node.value, &entry.place)) {
         Some((Value::String(word), place)) => match Unit::of(word) {
             Some(unit) => unit,
@@ -148,7 +107,7 @@ pub(super) fn expand(object: &mut Node, home: &Home, notices: &mut Vec<Finding>)
 pub fn load(path: &OsStr, unit: Option<Unit>) -> Result<(ShapeFile, Vec<Finding>)> {
     let place = Place::of_path(path);
     let of_file = |problem: Problem| SceneError::new("", problem.what, problem.remedy).at(&place);
-    let soup = parse(path, &Home::Folder(PathBuf::new()), &place).map_err(of_file)?;
+    let soup = read(path, &Home::Folder(PathBuf::new()), &place).map_err(of_file)?;
     let Some(unit) = unit else {
         let remedy = Unit::choices(&soup.size(), |word| format!("--unit {word}"));
         return Err(of_file(Problem::new("a mesh file does not say its unit", remedy)));
@@ -159,42 +118,16 @@ pub fn load(path: &OsStr, unit: Option<Unit>) -> Result<(ShapeFile, Vec<Finding>
     Ok((shape, notices.into_iter().map(notice).collect()))
 }
 
-/// As much of a file's text as an error quotes.
-fn excerpt(text: &str) -> String {
-    match text.char_indices().nth(LONGEST_EXCERPT) {
-        Some((end, _)) => format!("{}...", &text[..end]),
-        None => text.into(),
-    }
-}
-
 /// Returns `true` if a name is that of a mesh file.
 pub fn is_mesh(name: impl AsRef<OsStr>) -> bool {
-    ending(name.as_ref()).is_some_and(|ending| ending == "stl" || ending == "obj")
-}
-
-fn ending(name: &OsStr) -> Option<String> {
-    Path::new(name).extension().map(|ending| ending.to_string_lossy().to_ascii_lowercase())
+    Format::of(name.as_ref()).is_some()
 }
 
 /// Reads a file by its name's ending.
-fn parse(name: &OsStr, home: &Home, named_at: &Place) -> std::result::Result<Soup, Problem> {
-    let read = match ending(name).as_deref() {
-        Some("stl") => stl::read,
-        Some("obj") => obj::read,
-        _ => return Err(Problem::new("is neither .stl nor .obj", "export it as STL or OBJ")),
+fn read(name: &OsStr, home: &Home, named_at: &Place) -> std::result::Result<Soup, Problem> {
+    let Some(format) = Format::of(name) else {
+        return Err(Problem::new("is neither .stl nor .obj", "export it as STL or OBJ"));
     };
     let bytes = home.mesh(name, named_at, limits::LARGEST_FILE);
-    read(bytes.map_err(|error| Problem::new(error.problem, error.remedy))?.into_owned())
-}
-
-/// From what the file says to a closed surface in metres.
-fn body(mut soup: Soup, unit: Unit, scale: f64) -> std::result::Result<Repaired, Problem> {
-    soup.scale(|length| unit.metres(length * scale));
-    let is_far = |corner: &nalgebra::Vector3<f64>| !(corner.amax() <= FARTHEST_M);
-    if let Some(k) = soup.triangles.iter().position(|corners| corners.iter().any(is_far)) {
-        let number = soup.numbers[k] + 1;
-        let what = format!("triangle {number} has a corner more than {FARTHEST_M:e} m from the origin");
-        return Err(Problem::new(what, "check its unit and its scale, or export it again"));
-    }
-    repair(soup).map_err(|fault| Problem::new(fault.to_string(), fault.remedy()))
+    parse(format, bytes.map_err(|error| Problem::new(error.problem, error.remedy))?.into_owned())
 }
