@@ -11,7 +11,7 @@ use blindgrasp_files as files;
 use nix::fcntl::OFlag;
 use nix::sys::signal::{Signal, killpg};
 use nix::sys::stat::Mode;
-use nix::unistd::{Pid, mkfifo};
+use nix::unistd::{Pid, mkdtemp, mkfifo};
 use std::collections::VecDeque;
 use std::fs::{self, OpenOptions};
 use std::io::{self, Read};
@@ -23,7 +23,6 @@ use std::process::{Child, Command, ExitStatus, Stdio};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
-use tempfile::TempDir;
 
 /// The program.
 const PROGRAM: &str = "qemu-system-arm";
@@ -129,8 +128,8 @@ impl Qemu {
     /// # Errors
     /// If it does not start.
     pub fn with_pipes(&self) -> Result<Emulated, QemuError> {
-        let folder = TempDir::with_prefix("blindgrasp-")?;
-        let [to, from] = ["to", "from"].map(|name| folder.path().join(name));
+        let folder = Folder::new()?;
+        let [to, from] = ["to", "from"].map(|name| folder.0.join(name));
         for path in [&to, &from] {
             mkfifo(path, Mode::S_IRUSR | Mode::S_IWUSR).map_err(io::Error::from)?;
         }
@@ -153,8 +152,8 @@ impl Qemu {
     /// # Errors
     /// If it does not start.
     pub fn with_uart(&self) -> Result<Emulated, QemuError> {
-        let folder = TempDir::with_prefix("blindgrasp-")?;
-        let listener = UnixListener::bind(folder.path().join("uart"))?;
+        let folder = Folder::new()?;
+        let listener = UnixListener::bind(folder.0.join("uart"))?;
         listener.set_nonblocking(true)?;
         // The second serial port is USART2.
         let mut process = self.start(folder, &["null", "unix:uart"], "uart", &[])?;
@@ -172,7 +171,7 @@ impl Qemu {
     /// # Errors
     /// If it does not, or lacks one of the keys.
     pub fn bench(&self, keys: &[&str]) -> Result<serde_json::Map<String, serde_json::Value>, QemuError> {
-        let folder = TempDir::with_prefix("blindgrasp-")?;
+        let folder = Folder::new()?;
         // 16 ns of the firmware's time for each instruction, whatever the time is here.
         let clock = ["-icount", "shift=4,sleep=off"];
         let mut process = self.start(folder, &["null", "null"], "bench", &clock)?;
@@ -196,7 +195,7 @@ impl Qemu {
 
     fn start(
         &self,
-        folder: TempDir,
+        folder: Folder,
         serial_ports: &[&str],
         arguments: &str,
         options: &[&str],
@@ -209,7 +208,7 @@ impl Qemu {
         command.arg("-semihosting-config").arg(format!("enable=on,target=native,arg={arguments}"));
         command.args(options).arg("-kernel").arg(&self.image);
         // Names relative to the folder need no escapes, whatever is in its path.
-        command.current_dir(folder.path()).process_group(0);
+        command.current_dir(&folder.0).process_group(0);
         command.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped());
         let mut child = command.spawn().map_err(|source| match source.kind() {
             io::ErrorKind::NotFound => QemuError::Missing(self.program.clone()),
@@ -259,13 +258,28 @@ impl Transport for Emulated {
     }
 }
 
+/// A folder of its own, removed when it is dropped.
+struct Folder(PathBuf);
+
+impl Folder {
+    fn new() -> io::Result<Self> {
+        Ok(Self(mkdtemp(&std::env::temp_dir().join("blindgrasp-XXXXXX"))?))
+    }
+}
+
+impl Drop for Folder {
+    fn drop(&mut self) {
+        let _ = fs::remove_dir_all(&self.0);
+    }
+}
+
 /// QEMU.
 struct Process {
     child: Child,
     stdout: Tail,
     stderr: Tail,
     /// The folder of its pipes or its socket, until their names are needed no more.
-    folder: Option<TempDir>,
+    folder: Option<Folder>,
 }
 
 impl Process {

@@ -2,19 +2,19 @@
 
 use super::sample::{ContactSample, Sample};
 use blindgrasp_shared::control::GAINS;
-use std::io::{self, Write};
+use std::io::{self, BufWriter, Write};
 
 /// Samples on their way to a file, with a header. Numbers are in the shortest form that reads back as the same bits.
 pub struct Trace<W: Write> {
-    writer: csv::Writer<W>,
+    to: BufWriter<W>,
     row: Vec<f64>,
-    failure: Option<csv::Error>,
+    failure: Option<io::Error>,
 }
 
 impl<W: Write> Trace<W> {
     /// Begins a trace.
     pub fn new(to: W) -> Self {
-        Self { writer: csv::Writer::from_writer(to), row: Vec::new(), failure: None }
+        Self { to: BufWriter::new(to), row: Vec::new(), failure: None }
     }
 
     /// Takes the next sample. What can't be written ends the trace, and is told at its end.
@@ -24,17 +24,16 @@ impl<W: Write> Trace<W> {
         }
     }
 
-    fn write(&mut self, sample: &Sample) -> Result<(), csv::Error> {
+    fn write(&mut self, sample: &Sample) -> io::Result<()> {
         if self.row.is_empty() {
-            self.writer.write_record(header(sample.angles_rad.len(), sample.contacts.len()))?;
+            writeln!(self.to, "{}", header(sample.angles_rad.len(), sample.contacts.len()).join(","))?;
         }
         self.row.clear();
         fill(&mut self.row, sample);
         for value in &self.row {
-            self.writer.write_field(value.to_string())?;
+            write!(self.to, "{value},")?;
         }
-        self.writer.write_field(sample.mode)?;
-        self.writer.write_record(None::<&[u8]>)
+        writeln!(self.to, "{}", sample.mode)
     }
 
     /// Ends the trace.
@@ -43,8 +42,8 @@ impl<W: Write> Trace<W> {
     /// What went wrong since its beginning.
     pub fn finish(mut self) -> io::Result<()> {
         match self.failure {
-            Some(failure) => Err(failure.into()),
-            None => self.writer.flush(),
+            Some(failure) => Err(failure),
+            None => self.to.flush(),
         }
     }
 }

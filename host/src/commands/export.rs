@@ -1,7 +1,8 @@
 //! `blindgrasp export`: a recording as a table.
 
 use super::Outcome;
-use super::reading::{Span, chosen_device, damage_of, reading_bar, start_ns};
+use super::progress::Progress;
+use super::reading::{Span, chosen_device, damage_of, show, start_ns};
 use crate::terminal;
 use anyhow::Context;
 use blindgrasp::files::NewFile;
@@ -76,10 +77,9 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
         Some(file) => Box::new(file),
     };
     let mut entries = recording.entries()?;
-    let bar = reading_bar(&arguments.file);
-    let exported =
-        export(&mut entries, |entries| bar.set_position(entries.position().0), &request, format, to);
-    bar.finish_and_clear();
+    let progress = Progress::new();
+    let exported = export(&mut entries, |entries| show(&progress, entries.position()), &request, format, to);
+    drop(progress);
     let exported = match exported {
         Err(ExportError::Table(error)) if error.is_broken_pipe() => return Ok(Outcome::Shown),
         exported => exported.with_context(|| path.display().to_string())?,

@@ -1,6 +1,6 @@
 //! `blindgrasp flash`: firmware onto a microcontroller, over a debug probe.
 
-use super::Outcome;
+use super::{Outcome, progress};
 use crate::terminal;
 use anyhow::{Context, bail};
 use blindgrasp::device::flash::logs::Logs;
@@ -13,7 +13,6 @@ use blindgrasp::device::{interrupt, options};
 use blindgrasp::files;
 use blindgrasp::model::HandModel;
 use clap::Args;
-use indicatif::{ProgressBar, ProgressStyle};
 use probe_rs::probe::list::Lister;
 use serde::Serialize;
 use std::fs;
@@ -125,10 +124,10 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
     if arguments.brown_out.is_some() {
         with_options(&mut session, &chip, |core| options::unprotected(core).map(|_| ()))?;
     }
-    let bars = Bars::new();
+    let line = progress::Progress::new();
     let verify = arguments.verify || !arguments.no_verify;
-    let written = download(&mut session, &chip, &firmware, verify, |progress| bars.show(progress));
-    bars.0.finish_and_clear();
+    let written = download(&mut session, &chip, &firmware, verify, |progress| show_phase(&line, progress));
+    drop(line);
     written?;
     if let Some(level) = arguments.brown_out {
         let before = with_options(&mut session, &chip, |core| options::set_brown_out(core, level))?;
@@ -268,25 +267,15 @@ fn describe_report(report: &Report<'_>) -> String {
     lines.into_iter().chain(brown_out).map(|(name, value)| format!("{name:<22}{value}\n")).collect()
 }
 
-/// One bar for one phase after the other; hidden where stderr is not a terminal.
-struct Bars(ProgressBar);
-
-impl Bars {
-    fn new() -> Self {
-        let style = "{msg:<9} {bar:40} {percent:>3} %  {bytes} of {total_bytes}";
-        let style = ProgressStyle::with_template(style).unwrap_or_else(|_| ProgressStyle::default_bar());
-        Self(ProgressBar::new(0).with_style(style))
-    }
-
-    fn show(&self, progress: Progress) {
-        self.0.set_message(match progress.phase {
-            Phase::Erase => "erasing",
-            Phase::Program => "writing",
-            Phase::Verify => "verifying",
-        });
-        self.0.set_length(progress.total_bytes);
-        self.0.set_position(progress.done_bytes);
-    }
+fn show_phase(line: &progress::Progress, Progress { phase, done_bytes, total_bytes }: Progress) {
+    let phase = match phase {
+        Phase::Erase => "erasing",
+        Phase::Program => "writing",
+        Phase::Verify => "verifying",
+    };
+    line.show(done_bytes, total_bytes, |percent| {
+        format!("{percent:>3} % of {} kB, {phase}", total_bytes / 1000)
+    });
 }
 
 /// A flag that Ctrl-C sets.

@@ -13,6 +13,7 @@ pub(crate) mod object;
 pub(crate) mod paper;
 pub(crate) mod pil;
 mod ports;
+mod progress;
 mod reading;
 pub(crate) mod record;
 pub(crate) mod recording;

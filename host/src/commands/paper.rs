@@ -1,6 +1,7 @@
 //! `blindgrasp paper`: every table, figure and claim of the paper, run and checked.
 
 use super::Outcome;
+use super::progress::Progress;
 use crate::terminal;
 use anyhow::Context;
 use blindgrasp::files::NewFolder;
@@ -9,9 +10,9 @@ use blindgrasp::paper::expected::Surprise;
 use blindgrasp::paper::files;
 use blindgrasp::paper::report::{self, Paper};
 use clap::Args;
-use indicatif::{ProgressBar, ProgressStyle};
 use std::fmt::Write as _;
 use std::path::PathBuf;
+use std::sync::atomic::{AtomicU64, Ordering};
 
 /// Run the simulation and the experiments of the paper, and check each of its claims
 ///
@@ -33,16 +34,15 @@ pub(crate) struct Arguments {
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
     // Now, and not after minutes of runs.
     let folder = arguments.out.as_ref().map(|path| NewFolder::create(path, arguments.force)).transpose()?;
-    let bar = ProgressBar::new(report::runs() as u64);
-    let style = "{bar:40} {pos} of {len} runs in {elapsed}  {msg}";
-    bar.set_style(ProgressStyle::with_template(style).unwrap_or_else(|_| ProgressStyle::default_bar()));
+    let progress = Progress::new();
+    let runs = AtomicU64::new(0);
     let paper = Paper::reproduce(&|name| {
-        bar.set_message(name.to_owned());
-        bar.inc(1);
+        let done = runs.fetch_add(1, Ordering::Relaxed) + 1;
         // Bisection adds runs.
-        bar.set_length(bar.position().max(bar.length().unwrap_or_default()));
+        let of = done.max(report::runs() as u64);
+        progress.show(done, of, |_| format!("{done} of {of} runs, {name}"));
     })?;
-    bar.finish_and_clear();
+    drop(progress);
     let text = if arguments.json { paper.json().to_string() + "\n" } else { table(&paper) };
     terminal::print(&text).context("cannot print the claims")?;
     if let (Some(folder), Some(path)) = (folder, &arguments.out) {

@@ -1,5 +1,6 @@
 //! `blindgrasp pil`: the closed loop with the firmware in it.
 
+use super::progress::Progress;
 use super::{Outcome, sim};
 use crate::terminal;
 use anyhow::Context;
@@ -114,19 +115,19 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
     let linked = Linked::connect(&plan, Client::new(transport, Patience::default()))?;
     let mut simulation = Simulation::with_controller(&scene, Pilot::new(&plan, linked))
         .with_context(|| format!("scene {}", scene.name))?;
-    let bar = sim::progress_bar(scene.duration_s);
+    let progress = Progress::new();
     let mut ticks = 0;
     let ended = loop {
         match simulation.step() {
             Ok(Some(step)) => {
                 ticks += usize::from(step.sample.is_some());
-                bar.set_position((step.t_s * 1e3) as u64);
+                sim::show(&progress, step.t_s, scene.duration_s);
             }
             Ok(None) => break Ok(()),
             Err(error) => break Err(error),
         }
     };
-    bar.finish_and_clear();
+    drop(progress);
 
     let linked = simulation.controller().peer();
     let Comparison { bits_differ, first_difference, .. } = linked.comparison();

@@ -1,11 +1,10 @@
 //! The part that commands which read a recording have in common.
 
+use super::progress::Progress;
 use anyhow::{Context, bail};
 use blindgrasp::files;
 use blindgrasp::record::mcap::{Damage, Entries, Recording};
 use clap::Args;
-use indicatif::{ProgressBar, ProgressStyle};
-use std::path::Path;
 
 /// A part of a recording.
 #[derive(Args)]
@@ -67,10 +66,7 @@ pub(super) fn damage_of(recording: &Recording, entries: &Entries) -> Option<Stri
     }
 }
 
-/// A bar over the bytes of a file; hidden where stderr is no terminal.
-pub(super) fn reading_bar(path: &Path) -> ProgressBar {
-    let bytes = std::fs::metadata(path).map_or(0, |metadata| metadata.len());
-    let style = "{bar:40} {percent:>3} %  {bytes} of {total_bytes}, {eta} left";
-    ProgressBar::new(bytes)
-        .with_style(ProgressStyle::with_template(style).unwrap_or_else(|_| ProgressStyle::default_bar()))
+/// Shows how much of a file is read.
+pub(super) fn show(progress: &Progress, (read, bytes): (u64, u64)) {
+    progress.show(read, bytes, |percent| format!("{percent:>3} % of {:.1} MB", bytes as f64 / 1e6));
 }

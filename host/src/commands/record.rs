@@ -1,5 +1,6 @@
 //! `blindgrasp record`: everything that one or more hands say, into one file.
 
+use super::progress::Progress;
 use super::{Outcome, in_a_line, ports};
 use crate::terminal;
 use anyhow::{Context, anyhow, bail};
@@ -9,7 +10,6 @@ use blindgrasp::device::talk::{self, Event, Talk, TalkError};
 use blindgrasp::device::transport::{Transport, TransportError};
 use blindgrasp::record::mcap::{RecordingError, Saved};
 use clap::Args;
-use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
 use std::collections::BTreeSet;
 use std::fmt::Write as _;
@@ -155,11 +155,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
         talk::wanted_bauds(&mut **line, port, arguments.baud)?;
     }
     let recording = Recording::create(out, arguments.force)?;
-    let bar = ProgressBar::new_spinner();
-    // What is said to a terminal that is none goes nowhere.
-    let style = ProgressStyle::with_template("{spinner} {msg}").context("the progress line")?;
-    bar.set_style(style);
-    bar.enable_steady_tick(Duration::from_millis(250));
+    let progress = Progress::new();
 
     let begun = Instant::now();
     let until = arguments.duration.map(|seconds| begun + Duration::from_secs_f64(seconds));
@@ -180,9 +176,9 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
             scope.spawn(move || attendant.run(line));
         }
         drop(tell);
-        follow(&news, &bar, &recording, ports, begun, &ending)
+        follow(&news, &progress, &recording, ports, begun, &ending)
     });
-    bar.finish_and_clear();
+    drop(progress);
     let finished = recording.finish();
     finish(arguments, ended, finished)
 }
@@ -195,7 +191,7 @@ fn name(k: usize, count: usize) -> String {
 /// Tells the user what the threads tell, until they have ended.
 fn follow(
     news: &Receiver<News>,
-    bar: &ProgressBar,
+    progress: &Progress,
     recording: &Recording,
     ports: &[String],
     begun: Instant,
@@ -205,7 +201,7 @@ fn follow(
     let mut ended: Vec<Option<Ended>> = ports.iter().map(|_| None).collect();
     loop {
         match news.recv_timeout(Duration::from_millis(250)) {
-            Ok(News::Words(k, words)) => bar.suspend(|| eprintln!("blindgrasp: {}: {words}", ports[k])),
+            Ok(News::Words(k, words)) => progress.above(|| eprintln!("blindgrasp: {}: {words}", ports[k])),
             Ok(News::Status(k, status)) => totals[k] = status,
             Ok(News::End(k, end)) => {
                 // The other hands have not been taken.
@@ -221,12 +217,14 @@ fn follow(
         let saved = recording.saved();
         let lost: u64 = totals.iter().map(|totals| totals.missing).sum();
         let elapsed_s = begun.elapsed().as_secs_f64();
-        bar.set_message(format!(
-            "{elapsed_s:.0} s, {} records, {lost} lost, {:.0} a second, {:.1} MB",
-            saved.records,
-            saved.records as f64 / elapsed_s.max(1e-3),
-            saved.bytes as f64 / 1e6
-        ));
+        progress.say(|| {
+            format!(
+                "{elapsed_s:.0} s, {} records, {lost} lost, {:.0} a second, {:.1} MB",
+                saved.records,
+                saved.records as f64 / elapsed_s.max(1e-3),
+                saved.bytes as f64 / 1e6
+            )
+        });
     }
 }
 

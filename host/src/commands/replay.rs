@@ -1,7 +1,8 @@
 //! `blindgrasp replay`: a recording through the controller again.
 
 use super::Outcome;
-use super::reading::{Span, chosen_device, damage_of, reading_bar, start_ns};
+use super::progress::Progress;
+use super::reading::{Span, chosen_device, damage_of, show, start_ns};
 use crate::terminal;
 use anyhow::Context;
 use blindgrasp::model::HandModel;
@@ -69,16 +70,16 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
     let device = chosen_device(&recording, arguments.device.as_deref())?;
     let name = recording.devices()[device].clone();
     let mut entries = recording.entries()?;
-    let bar = reading_bar(&arguments.file);
+    let progress = Progress::new();
     let replayed = replay(
         &mut entries,
-        |entries| bar.set_position(entries.position().0),
+        |entries| show(&progress, entries.position()),
         device,
         &name,
         start_ns(&recording),
         wanted,
     );
-    bar.finish_and_clear();
+    drop(progress);
     let mut report = replayed?;
     report.damage = damage_of(&recording, &entries);
     if let Some(damage) = &report.damage {

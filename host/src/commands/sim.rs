@@ -1,6 +1,7 @@
 //! `blindgrasp sim`: the closed loop on the host.
 
 use super::Outcome;
+use super::progress::Progress;
 use crate::terminal;
 use anyhow::Context;
 use blindgrasp::files::{self, NewFolder, OutputError};
@@ -13,7 +14,6 @@ use blindgrasp::sim::summary::Summary;
 use blindgrasp::sim::thinned::Thinned;
 use blindgrasp::view;
 use clap::Args;
-use indicatif::{ProgressBar, ProgressStyle};
 use std::ffi::OsString;
 use std::fmt::Write as _;
 use std::fs::File;
@@ -72,13 +72,13 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
         .as_ref()
         .and_then(|made| made.as_ref().ok())
         .map(|to| Recorder::create(&to.recording(), to.force(), &scene, simulation.controller()));
-    let bar = progress_bar(scene.duration_s);
+    let progress = Progress::new();
     let mut files = match &output {
         Some(Ok(Destination::Folder(folder))) => Some(Files::begin(folder)),
         _ => None,
     };
     while let Ok(Some(step)) = simulation.step() {
-        bar.set_position((step.t_s * 1e3) as u64);
+        show(&progress, step.t_s, scene.duration_s);
         if let Some(Ok(recorder)) = &mut recorder {
             recorder.see(&step);
         }
@@ -86,7 +86,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
             files.see(sample);
         }
     }
-    bar.finish_and_clear();
+    drop(progress);
 
     let summary = simulation.summary();
     let text = if arguments.json { serde_json::to_string(&summary)? + "\n" } else { describe(&summary) };
@@ -106,11 +106,10 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
     Ok(if summary.grasp_held { Outcome::Shown } else { Outcome::Failed })
 }
 
-/// A bar over simulated milliseconds; hidden where stderr is not a terminal.
-pub(super) fn progress_bar(duration_s: f64) -> ProgressBar {
-    let style = "{bar:40} {percent:>3} %  {msg}simulated, {eta} left";
-    ProgressBar::new((duration_s * 1e3) as u64)
-        .with_style(ProgressStyle::with_template(style).unwrap_or_else(|_| ProgressStyle::default_bar()))
+/// Shows how much is simulated.
+pub(super) fn show(progress: &Progress, t_s: f64, duration_s: f64) {
+    progress
+        .show((t_s * 1e3) as u64, (duration_s * 1e3) as u64, |percent| format!("{percent:>3} % simulated"));
 }
 
 /// The place that a run is written to.

@@ -1,6 +1,7 @@
 //! `blindgrasp sweep`: a scene over a grid of values.
 
 use super::Outcome;
+use super::progress::Progress;
 use crate::terminal;
 use anyhow::{Context, bail};
 use blindgrasp::device::interrupt;
@@ -10,10 +11,10 @@ use blindgrasp::sweep::{
     self, Axis, Edge, Identity, Journal, Output, Overview, Plan, Row, Swept, Value, Varied,
 };
 use clap::Args;
-use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
 use std::fmt::Write as _;
 use std::path::PathBuf;
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Instant;
 
 /// More rows are not printed: they are in the file.
@@ -94,14 +95,19 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
 
     interrupt::listen();
     let begun = Instant::now();
-    let bar = progress_bar(plan.runs(), found.rows.len());
+    let progress = Progress::new();
+    let counts = [found.rows.len(), plan.runs()].map(|count| AtomicU64::new(count as u64));
+    let show = |[done, runs]: [u64; 2]| progress.show(done, runs, |_| format!("{done} of {runs} runs"));
+    show(counts.each_ref().map(|count| count.load(Ordering::Relaxed)));
     let each = |row: &Row| {
-        bar.set_length((row.run as u64 + 1).max(bar.length().unwrap_or_default()));
-        bar.inc(1);
+        let done = counts[0].fetch_add(1, Ordering::Relaxed) + 1;
+        // Bisection adds runs.
+        let last = row.run as u64 + 1;
+        show([done, counts[1].fetch_max(last, Ordering::Relaxed).max(last)]);
         journal.keep(row)
     };
     let swept = sweep::run_refined(&mut plan, found.rows, arguments.refine, each, || !interrupt::wanted());
-    bar.finish_and_clear();
+    drop(progress);
     let Swept { rows, is_whole } =
         swept.context("the sweep is stopped; the same command goes on from where it was")?;
     if !is_whole {
@@ -163,16 +169,6 @@ fn warn(plan: &Plan) {
             "blindgrasp: warning: --seeds: the scene has no noise, so that all seeds give the same; set sensors.noise_counts"
         );
     }
-}
-
-/// A bar over the runs; hidden where stderr is not a terminal.
-fn progress_bar(runs: usize, done: usize) -> ProgressBar {
-    let style = "{bar:40} {pos} of {len} runs, {eta} left";
-    let bar = ProgressBar::new(runs as u64)
-        .with_style(ProgressStyle::with_template(style).unwrap_or_else(|_| ProgressStyle::default_bar()))
-        .with_position(done as u64);
-    bar.reset_eta();
-    bar
 }
 
 /// The overview as a table; of a sweep of one key, every row, if there are not too many.

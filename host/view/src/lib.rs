@@ -30,6 +30,7 @@ mod raster;
 mod scene3d;
 mod skeleton;
 mod sketch;
+#[cfg(feature = "strip")]
 mod strip;
 #[cfg(test)]
 mod tests;
@@ -39,6 +40,7 @@ pub mod units;
 pub use input::Report;
 pub use palette::{Rgb, of as colour};
 pub use sketch::{hand_svg, object_svg};
+#[cfg(feature = "strip")]
 pub use strip::Strip;
 
 use std::path::{Path, PathBuf};

@@ -120,9 +120,6 @@ pub enum TableError {
     /// The file system said no.
     #[error("cannot write the table: {0}")]
     Write(#[from] io::Error),
-    /// The file system said no, or a row has other columns than the header.
-    #[error("cannot write the table: {0}")]
-    Csv(#[from] ::csv::Error),
     /// The file system said no, or Parquet can't express it.
     #[cfg(feature = "parquet")]
     #[error("cannot write the table: {0}")]
@@ -135,7 +132,6 @@ impl TableError {
         let is_it = |error: &io::Error| error.kind() == io::ErrorKind::BrokenPipe;
         match self {
             Self::Write(error) => is_it(error),
-            Self::Csv(error) => matches!(error.kind(), ::csv::ErrorKind::Io(error) if is_it(error)),
             Self::NotBuilt => false,
             #[cfg(feature = "parquet")]
             Self::Parquet(error) => {

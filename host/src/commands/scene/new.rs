@@ -11,7 +11,7 @@ use blindgrasp::place::{NoPlacement, Reach, Request, place, scene_text, template
 use clap::Args;
 use std::collections::BTreeMap;
 use std::ffi::OsString;
-use std::path::{Path, PathBuf};
+use std::path::{Component, Path, PathBuf};
 
 /// The most placements that can be listed.
 const LONGEST_LIST: usize = 100;
@@ -198,8 +198,16 @@ fn reference(path: &OsString, scene: &Path) -> anyhow::Result<String> {
     };
     let [target, folder] = [Path::new(path), &folder]
         .map(|path| path.canonicalize().with_context(|| path.display().to_string()));
-    let (target, folder) = (target?, folder?);
-    // Between two drives there is no relative path.
-    let path = pathdiff::diff_paths(&target, folder).unwrap_or(target);
+    let path = relative(target?, &folder?);
     path.to_str().map(str::to_owned).with_context(|| format!("{} is not UTF-8", path.display()))
+}
+
+/// Returns an absolute path as one from a folder; between two drives there is none.
+fn relative(target: PathBuf, folder: &Path) -> PathBuf {
+    let shared = folder.components().zip(target.components()).take_while(|(one, other)| one == other).count();
+    if shared == 0 {
+        return target;
+    }
+    let up = folder.components().skip(shared).map(|_| Component::ParentDir);
+    up.chain(target.components().skip(shared)).collect()
 }
