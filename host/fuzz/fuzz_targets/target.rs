@@ -1,15 +1,6 @@
 //! Any bytes through the readers of files: one target for each.
 //!
-//! With `cargo install cargo-fuzz`, in the directory `host`; what is found stays in the first folder, the others are seeds:
-//!
-//! ```text
-//! mkdir -p fuzz/corpus/stl
-//! cargo +nightly fuzz run --sanitizer none stl fuzz/corpus/stl ../tests/data/broken ../models/objects -- -max_total_time=60
-//! ```
-//!
-//! The targets are `urdf`, `hand` (with seeds of `../models/hands`), `stl`, `obj`, `object` (`../models/objects`) and `scene`
-//! (`../models/scenes`). Without a nightly compiler, `RUSTC_BOOTSTRAP=1 cargo fuzz run ...` does. There is no unsafe code for a
-//! sanitizer to watch.
+//! `tests/fuzz` runs them: `urdf`, `hand`, `stl`, `obj`, `object` and `scene`.
 //!
 //! What is checked is in `tests/broken/property.rs`, and is checked for a bounded number of inputs by `cargo test` too.
 

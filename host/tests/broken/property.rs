@@ -1,11 +1,11 @@
 //! The property of any bytes that are given to a reader: they are refused in one line, or what they describe can be
 //! written and read again as the same. Shared with the fuzz targets (`fuzz/`).
 
-use blindgrasp::model::file::{ObjectFile, SCHEMA};
-use blindgrasp::model::inspect::hand::HandCheck;
-use blindgrasp::model::inspect::object::{ObjectCheck, Wanted};
-use blindgrasp::model::mesh::{self, Unit};
-use blindgrasp::model::{HandFile, Scene, SceneError, StarterRequest};
+use blindgrasp_model::file::{ObjectFile, SCHEMA};
+use blindgrasp_model::inspect::hand::HandCheck;
+use blindgrasp_model::inspect::object::{ObjectCheck, Wanted};
+use blindgrasp_model::mesh::{self, Unit};
+use blindgrasp_model::{HandFile, Scene, SceneError, StarterRequest};
 use std::fs;
 use std::path::Path;
 
