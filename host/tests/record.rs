@@ -473,7 +473,7 @@ fn a_hand_that_is_cut_off_is_waited_for_and_another_loses_nothing() {
     let folder = TempDir::new().expect("a folder");
     let links = ["left", "right"].map(|name| folder.path().join(name));
     let out = folder.path().join("two.mcap");
-    let [left, _right] = [&links[0], &links[1]].map(|link| serve(link, &[]));
+    let [left, mut right] = [&links[0], &links[1]].map(|link| serve(link, &[]));
     let mut record = Process::start(recorded(&out, &[&links[0], &links[1]], &["--duration", "12"]));
     thread::sleep(Duration::from_secs(3));
     left.signal(Signal::SIGKILL);
@@ -482,6 +482,8 @@ fn a_hand_that_is_cut_off_is_waited_for_and_another_loses_nothing() {
     let _left = serve(&links[0], &[]);
     let back = Stamp::now();
     let (code, said, errors) = record.end(PATIENCE);
+    right.signal(Signal::SIGINT);
+    let missed = missed_in_all(&right.end(PATIENCE).2);
     assert_eq!(code, Some(1), "{said}\n{errors}");
     assert!(errors.contains("; waiting for it to come back") && errors.contains("back after "), "{errors}");
     let report: Value = serde_json::from_str(&said).expect("JSON");
@@ -492,8 +494,9 @@ fn a_hand_that_is_cut_off_is_waited_for_and_another_loses_nothing() {
     let [left, right] = &read(&out)[..] else { panic!("two devices") };
     assert!(!left.damaged && right.gaps.is_empty());
     assert_whole(&right.records);
-    // Most of the 12 s: it may have given up ticks.
-    assert!(every_tick(&right.records).len() > 6000, "{}", right.records.len());
+    // Everything but the first moments, in which parameters are read, and the ticks that it gave up.
+    let ticks = every_tick(&right.records).len() as u64;
+    assert!(ticks + missed + 3000 > 12_000, "{ticks} ticks, {missed} missed");
     let [gap] = left.gaps[..] else { panic!("{:?}", left.gaps) };
     assert_eq!(left.sessions, 2);
     let (before, after) = left.records.split_at(gap);
@@ -663,7 +666,7 @@ fn what_was_killed_at_any_moment_is_whole_to_the_last_second() {
     );
     assert_eq!(lost_s.len(), HANDS * KILLS);
     // Where the machine gives a hand, or its recording, no time for a while, no record comes that could be saved: nine of ten are
-    // not to be blamed for that.
+    // not to be blamed for that. By the stamps, all of it is in the file: `at_any_tick_all_but_the_last_half_second_is_in_the_file`.
     lost_s.sort_by(f64::total_cmp);
     let usual_s = lost_s[lost_s.len() * 9 / 10 - 1];
     assert!(usual_s <= 1.0, "{usual_s} s");

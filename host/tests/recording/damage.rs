@@ -106,6 +106,29 @@ fn killed_while_it_writes_the_file_is_what_it_was() {
     }
 }
 
+/// By the stamps, so that nothing depends on the machine: of a program that is killed at any tick, nothing older than half a second
+/// is missing. What comes to a chunk and its write adds no record.
+#[test]
+fn at_any_tick_all_but_the_last_half_second_is_in_the_file() {
+    let mut random = fastrand::Rng::with_seed(9);
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.mcap");
+    let mut writer = Writer::create(&path, false).unwrap();
+    let device = writer.add_device("hand");
+    writer.about(device, Stamp(0), &about("three-finger")).unwrap();
+    let mut hand = Hand::new(12);
+    for tick in 1..=3000_u64 {
+        let (_, payload) = hand.tick(&mut random);
+        writer.received(device, Stamp(tick * 1_000_000), &payload).unwrap();
+        // Just before and after a write, and anywhere between.
+        if tick % 500 < 3 || tick % 83 == 0 {
+            let (entries, damage, _) = read(&path);
+            let received = entries.iter().filter(|entry| matches!(entry.what, What::Received(_))).count() as u64;
+            assert!(received + 500 >= tick && damage.unfinished, "{received} of {tick}");
+        }
+    }
+}
+
 /// Changes a copy somehow.
 fn corrupt(bytes: &mut Vec<u8>, random: &mut fastrand::Rng) {
     let length = bytes.len();
