@@ -21,13 +21,6 @@ fn stl((vertices, triangles): &Mesh) -> String {
     text + "endsolid part\n"
 }
 
-/// A new folder for the files of a test.
-fn folder(name: &str) -> PathBuf {
-    let folder = std::env::temp_dir().join(format!("blindgrasp-mesh-{name}-{}", std::process::id()));
-    std::fs::create_dir_all(&folder).unwrap();
-    folder
-}
-
 #[test]
 fn shipped_meshes_are_what_their_files_say() {
     let (file, places) = ObjectFile::load_with_places("octahedron").unwrap();
@@ -49,7 +42,8 @@ fn shipped_meshes_are_what_their_files_say() {
 /// A mesh in a scene: relative to the object's file, and nothing of it is needed once it is read.
 #[test]
 fn a_scene_with_a_mesh_needs_no_file() {
-    let folder = folder("scene");
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
     std::fs::create_dir_all(folder.join("parts")).unwrap();
     let (vertices, triangles) = blindgrasp_meshes::grid_box([0.048; 3], 3);
     std::fs::write(folder.join("parts/Block.STL"), stl(&(vertices, triangles))).unwrap();
@@ -85,16 +79,16 @@ fn a_scene_with_a_mesh_needs_no_file() {
     let inline = cube.replace("object = \"cube\"", "")
         + "[object]\nschema = 1\nname = \"b\"\nmass_kg = 0.002\n[object.shape.mesh]\nfile = \"parts/Block.STL\"\nunit = \"mm\"\n";
     let scene =
-        Scene::parse(&inline, "s.toml", &folder, &[format!("object.shape.mesh.file={}", stl.display())])
+        Scene::parse(&inline, "s.toml", folder, &[format!("object.shape.mesh.file={}", stl.display())])
             .unwrap();
     assert_eq!(scene.object, again.object);
-    assert_eq!(Scene::parse(&inline, "s.toml", &folder, &[]).unwrap(), scene);
-    std::fs::remove_dir_all(&folder).unwrap();
+    assert_eq!(Scene::parse(&inline, "s.toml", folder, &[]).unwrap(), scene);
 }
 
 #[test]
 fn what_an_object_says_of_its_mesh_is_checked() {
-    let folder = folder("keys");
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
     std::fs::write(folder.join("part.stl"), stl(&bracket())).unwrap();
     std::fs::write(folder.join("part.step"), b"ISO-10303-21;").unwrap();
     let path = folder.join("part.toml");
@@ -151,7 +145,6 @@ fn what_an_object_says_of_its_mesh_is_checked() {
     ] {
         assert_eq!(message(lines), expected, "{lines}");
     }
-    std::fs::remove_dir_all(&folder).unwrap();
 }
 
 #[test]
@@ -187,7 +180,8 @@ fn units_and_scales_give_metres() {
         assert_eq!(unit.metres(57.0), metres);
         assert_eq!(Unit::of(unit.word()), Some(unit));
     }
-    let folder = folder("units");
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
     let path = folder.join("part.stl");
     std::fs::write(&path, stl(&bracket())).unwrap();
     let size = |unit| match load(path.as_os_str(), Some(unit)).unwrap().0 {
@@ -204,7 +198,6 @@ fn units_and_scales_give_metres() {
             path.display()
         )
     );
-    std::fs::remove_dir_all(&folder).unwrap();
 }
 
 /// On an inner side of the L, the wall beside it is near.

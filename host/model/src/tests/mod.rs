@@ -1,5 +1,6 @@
 //! Scenes that are right: what is shipped, what is built in code, what settings and references do.
 
+pub(crate) mod cases;
 mod damage;
 mod hand_models;
 mod inverse_kinematics;
@@ -9,25 +10,7 @@ mod refusals;
 use super::*;
 use crate::file::{ContactFile, Indentation, InertiaFile, PushFile, ShapeFile};
 use blindgrasp_body::Posture;
-
-/// A sequence of numbers that is the same everywhere.
-pub(super) struct Numbers(pub(super) u64);
-
-impl Numbers {
-    /// In [0, 1).
-    pub(super) fn next(&mut self) -> f64 {
-        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        (self.0 >> 11) as f64 / (1u64 << 53) as f64
-    }
-
-    pub(super) fn below(&mut self, count: usize) -> usize {
-        (self.next() * count as f64) as usize
-    }
-
-    fn vector(&mut self) -> Vector3<f64> {
-        Vector3::from_fn(|_, _| 2.0 * self.next() - 1.0)
-    }
-}
+use blindgrasp_meshes::Numbers;
 
 fn text(name: &str) -> &'static str {
     Kind::Scene.built_in().iter().find(|(built_in, _)| *built_in == name).unwrap().1

@@ -1,7 +1,7 @@
 //! Files that are damaged: an error or a hand, never a panic, and soon.
 
 use super::*;
-use crate::tests::Numbers;
+use blindgrasp_meshes::Numbers;
 use std::time::{Duration, Instant};
 
 /// Replacements for a piece of a URDF.

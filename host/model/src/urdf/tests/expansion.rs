@@ -273,8 +273,8 @@ fn scenes_know_no_difference() {
 fn the_files_of_a_hand_are_known_also_when_they_are_wrong() {
     let folder = Folder::new(HAND, b"nonsense");
     let files = HandModel::files(folder.path("hand.toml"));
-    assert_eq!(files, [folder.0.join("hand.toml"), folder.0.join("gripper.urdf")]);
+    assert_eq!(files, [folder.0.path().join("hand.toml"), folder.0.path().join("gripper.urdf")]);
     std::fs::write(folder.path("hand.toml"), "nonsense").unwrap();
-    assert_eq!(HandModel::files(folder.path("hand.toml")), [folder.0.join("hand.toml")]);
-    assert_eq!(HandModel::files("three-finger"), Vec::<PathBuf>::new());
+    assert_eq!(HandModel::files(folder.path("hand.toml")), [folder.0.path().join("hand.toml")]);
+    assert_eq!(HandModel::files("three-finger"), Vec::<std::path::PathBuf>::new());
 }

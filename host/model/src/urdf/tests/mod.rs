@@ -8,9 +8,9 @@ mod starter;
 
 use super::super::file::HandFile;
 use super::super::hand_model::HandModel;
+use crate::tests::cases::cases;
 use blindgrasp_body::Hand;
-use std::path::PathBuf;
-use std::sync::atomic::{AtomicUsize, Ordering};
+use tempfile::TempDir;
 
 /// A gripper of four joints.
 const GRIPPER: &str = include_str!("gripper.urdf");
@@ -49,33 +49,23 @@ link = \"right-tip\"
 type Loaded = (HandFile, Hand, Vec<String>);
 
 /// A hand's file and its URDF on the disk, as long as this is there.
-struct Folder(PathBuf);
+struct Folder(TempDir);
 
 impl Folder {
     fn new(toml: &str, urdf: &[u8]) -> Self {
-        static COUNT: AtomicUsize = AtomicUsize::new(0);
-        let name =
-            format!("blindgrasp-urdf-{}-{}", std::process::id(), COUNT.fetch_add(1, Ordering::Relaxed));
-        let folder = Self(std::env::temp_dir().join(name));
-        std::fs::create_dir_all(&folder.0).unwrap();
+        let folder = Self(tempfile::tempdir().unwrap());
         std::fs::write(folder.path("hand.toml"), toml).unwrap();
         std::fs::write(folder.path("gripper.urdf"), urdf).unwrap();
         folder
     }
 
     fn path(&self, name: &str) -> String {
-        self.0.join(name).to_str().unwrap().into()
+        self.0.path().join(name).to_str().unwrap().into()
     }
 
     /// Without the folder in it.
     fn plain(&self, words: &str) -> String {
-        words.replace(&format!("{}/", self.0.display()), "")
-    }
-}
-
-impl Drop for Folder {
-    fn drop(&mut self) {
-        let _ = std::fs::remove_dir_all(&self.0);
+        words.replace(&format!("{}/", self.0.path().display()), "")
     }
 }
 
@@ -106,12 +96,4 @@ fn message(toml: &str, urdf: &str) -> String {
     let error = load(toml, urdf).map(|(file, _, _)| file.name).expect_err("has to be refused");
     assert!(!error.contains('\n'), "{error}");
     error
-}
-
-/// Each case: what is replaced in a text, by what, and what is said then.
-fn assert_all(cases: &[(&str, &str, &str)], text: &str, message: &dyn Fn(&str) -> String) {
-    for &(from, to, expected) in cases {
-        let found = message(&changed(text, from, to));
-        assert_eq!(found, expected, "{from:?} -> {to:?}");
-    }
 }

@@ -7,8 +7,11 @@ use crate::HandModel;
 /// Starts from a URDF; errors are without the folder.
 fn start(urdf: &str, change: impl Fn(&mut StarterRequest)) -> Result<(Folder, Starter), String> {
     let folder = Folder::new("", urdf.as_bytes());
-    let mut request =
-        StarterRequest { file: "gripper.urdf".into(), folder: folder.0.clone(), ..StarterRequest::default() };
+    let mut request = StarterRequest {
+        file: "gripper.urdf".into(),
+        folder: folder.0.path().to_owned(),
+        ..StarterRequest::default()
+    };
     change(&mut request);
     match request.start() {
         Ok(starter) => Ok((folder, starter)),
