@@ -1,8 +1,9 @@
 //! Chips, as probe-rs knows them.
 
-use crate::image::{Firmware, FitError, Footprint, Memory};
+use crate::image::{Firmware, Footprint, Memory};
+use anyhow::{Context, Result, bail};
 use probe_rs::config::{FlashProperties, MemoryRegion, Registry, RegistryError, SectorDescription};
-use probe_rs::flashing::{FlashError, FlashLoader};
+use probe_rs::flashing::FlashLoader;
 use probe_rs::{Architecture, Target};
 use std::ops::Range;
 
@@ -16,63 +17,36 @@ pub struct Chip {
     memory: Memory,
 }
 
-/// The reason for which a chip is not to be flashed, or not with this image.
-#[derive(Debug, thiserror::Error)]
-pub enum ChipError {
-    /// probe-rs knows no such chip.
-    #[error("no chip is called `{name}`{}", suggestion(.similar))]
-    Unknown {
-        /// The name that was asked for.
-        name: String,
-        /// Similar names.
-        similar: Vec<String>,
-    },
-    /// Its description cannot be read.
-    #[error("the description of the chip `{0}` cannot be used")]
-    Description(String, #[source] RegistryError),
-    /// It has no Arm core.
-    #[error("the chip `{0}` has no Arm core, so that no firmware of blindgrasp runs on it; check --chip")]
-    NotArm(String),
-    /// It has no flash to boot from.
-    #[error("the chip `{0}` has no flash that it boots from; check --chip")]
-    NoFlash(String),
-    /// The image does not fit.
-    #[error(transparent)]
-    Fit(#[from] FitError),
-    /// probe-rs would not write a part of the image.
-    #[error("what the image holds at {address:#010x} cannot be flashed")]
-    Refused {
-        /// The address.
-        address: u64,
-        /// The cause.
-        source: FlashError,
-    },
-}
-
-fn suggestion(similar: &[String]) -> String {
-    match similar {
-        [] => "; give its full name, as https://probe.rs/targets has it".to_owned(),
-        names => format!("; did you mean {}?", names.join(", ")),
-    }
-}
-
 impl Chip {
     /// Looks a chip up in probe-rs' own list.
     ///
     /// # Errors
     /// If there is none of this name, or it is of no use for firmware of blindgrasp.
-    pub fn by_name(name: &str) -> Result<Self, ChipError> {
+    pub fn by_name(name: &str) -> Result<Self> {
         let registry = Registry::from_builtin_families();
-        let target = registry.get_target_by_name(name).map_err(|error| match error {
-            RegistryError::ChipNotFound(_) | RegistryError::ChipNotUnique(..) => {
-                ChipError::Unknown { name: name.to_owned(), similar: similar(&registry, name) }
+        let target = match registry.get_target_by_name(name) {
+            Ok(target) => target,
+            Err(RegistryError::ChipNotFound(_) | RegistryError::ChipNotUnique(..)) => {
+                match similar(&registry, name).join(", ").as_str() {
+                    "" => bail!(
+                        "no chip is called `{name}`; give its full name, as https://probe.rs/targets has it"
+                    ),
+                    names => bail!("no chip is called `{name}`; did you mean {names}?"),
+                }
             }
-            error => ChipError::Description(name.to_owned(), error),
-        })?;
+            Err(error) => {
+                return Err(error)
+                    .with_context(|| format!("the description of the chip `{name}` cannot be used"));
+            }
+        };
+        let name = &target.name;
         if target.architecture() != Architecture::Arm {
-            return Err(ChipError::NotArm(target.name));
+            bail!(
+                "the chip `{name}` has no Arm core, so that no firmware of blindgrasp runs on it; check --chip"
+            );
         }
-        let memory = memory(&target).ok_or_else(|| ChipError::NoFlash(target.name.clone()))?;
+        let memory = memory(&target)
+            .with_context(|| format!("the chip `{name}` has no flash that it boots from; check --chip"))?;
         Ok(Self { target, memory })
     }
 
@@ -95,7 +69,7 @@ impl Chip {
     ///
     /// # Errors
     /// Why not.
-    pub fn check(&self, firmware: &Firmware<'_>) -> Result<Footprint, ChipError> {
+    pub fn check(&self, firmware: &Firmware<'_>) -> Result<Footprint> {
         let footprint = firmware.footprint(&self.memory)?;
         self.loader(firmware)?;
         Ok(footprint)
@@ -103,11 +77,13 @@ impl Chip {
 
     /// The image, ready to be written. probe-rs would write to RAM and to one-time-programmable memory too, which is why
     /// our own rules come first.
-    pub(super) fn loader(&self, firmware: &Firmware<'_>) -> Result<FlashLoader, ChipError> {
+    pub(super) fn loader(&self, firmware: &Firmware<'_>) -> Result<FlashLoader> {
         firmware.footprint(&self.memory)?;
         let mut loader = self.target.flash_loader();
         for (address, bytes) in firmware.stored() {
-            loader.add_data(address, bytes).map_err(|source| ChipError::Refused { address, source })?;
+            loader
+                .add_data(address, bytes)
+                .with_context(|| format!("what the image holds at {address:#010x} cannot be flashed"))?;
         }
         Ok(loader)
     }

@@ -1,5 +1,6 @@
 //! Logs of a firmware: defmt frames, decoded with the table in its ELF file.
 
+use anyhow::{Context, anyhow};
 use blindgrasp_wire::printable;
 use defmt_decoder::{DecodeError, Locations, StreamDecoder, Table};
 use std::fmt;
@@ -9,17 +10,6 @@ use std::path::Path;
 pub struct Logs {
     table: Table,
     locations: Locations,
-}
-
-/// The reason for which the logs of an image cannot be decoded.
-#[derive(Debug, thiserror::Error)]
-pub enum LogsError {
-    /// There are none.
-    #[error("this image has no defmt logs; build it with them, or leave out --monitor")]
-    None,
-    /// They are of another version, or inconsistent.
-    #[error("the defmt logs of this image cannot be decoded: {0}")]
-    Table(String),
 }
 
 /// A line of the log.
@@ -53,9 +43,14 @@ impl Logs {
     ///
     /// # Errors
     /// If it has none.
-    pub fn parse(elf: &[u8]) -> Result<Self, LogsError> {
-        let described = |error: anyhow::Error| LogsError::Table(format!("{error:#}").replace('\n', "; "));
-        let table = Table::parse(elf).map_err(described)?.ok_or(LogsError::None)?;
+    pub fn parse(elf: &[u8]) -> anyhow::Result<Self> {
+        let told = |error: anyhow::Error| {
+            let reason = format!("{error:#}").replace('\n', "; ");
+            anyhow!("the defmt logs of this image cannot be decoded: {reason}")
+        };
+        let table = Table::parse(elf)
+            .map_err(told)?
+            .context("this image has no defmt logs; build it with them, or leave out --monitor")?;
         // Without debug information there are none: lines are then shown without.
         let locations = table.get_locations(elf).unwrap_or_default();
         Ok(Self { table, locations })

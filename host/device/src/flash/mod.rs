@@ -11,10 +11,11 @@ pub mod monitor;
 pub mod probe;
 
 use super::image::Firmware;
+use anyhow::anyhow;
 use probe_rs::Session;
-use probe_rs::flashing::{DownloadOptions, FlashProgress, ProgressEvent, ProgressOperation};
+use probe_rs::flashing::{DownloadOptions, FlashError, FlashProgress, ProgressEvent, ProgressOperation};
 
-pub use chip::{Chip, ChipError};
+pub use chip::Chip;
 
 /// A phase of flashing.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -38,27 +39,8 @@ pub struct Progress {
     pub total_bytes: u64,
 }
 
-/// The reason for which an image could not be written to flash.
-#[derive(Debug, thiserror::Error)]
-pub enum DownloadError {
-    /// The image does not fit after all.
-    #[error(transparent)]
-    Chip(#[from] ChipError),
-    /// The flash does not hold the image afterwards.
-    #[error(
-        "the flash does not hold the image after writing it: the supply may sag or the flash be worn out; flash again, slower wiring and a shorter cable help"
-    )]
-    Differs,
-    /// Anything else.
-    #[error(
-        "the image could not be written, and what the chip holds now is not complete; check cable and supply, and that \
-        the chip is not write-protected, then flash again"
-    )]
-    Failed(#[source] probe_rs::flashing::FlashError),
-}
-
 /// Writes an image to the flash of a connected chip. Sectors that it does not touch stay as they are, those of saved
-/// parameters among them ([`FitError::ReachesSaved`](super::image::FitError::ReachesSaved)). The chip is left halted.
+/// parameters among them. The chip is left halted.
 ///
 /// # Errors
 /// If the image does not fit, or the chip or the probe fail.
@@ -68,7 +50,7 @@ pub fn download(
     firmware: &Firmware<'_>,
     verify: bool,
     mut report: impl FnMut(Progress),
-) -> Result<(), DownloadError> {
+) -> anyhow::Result<()> {
     let loader = chip.loader(firmware)?;
     let mut totals = [0_u64; 3];
     let mut done = [0_u64; 3];
@@ -99,8 +81,14 @@ pub fn download(
         }
     });
     loader.commit(session, options).map_err(|error| match error {
-        probe_rs::flashing::FlashError::Verify => DownloadError::Differs,
-        error => DownloadError::Failed(error),
+        FlashError::Verify => anyhow!(
+            "the flash does not hold the image after writing it: the supply may sag or the flash be worn out; flash again, \
+             slower wiring and a shorter cable help"
+        ),
+        error => anyhow!(error).context(
+            "the image could not be written, and what the chip holds now is not complete; check cable and supply, and that \
+             the chip is not write-protected, then flash again",
+        ),
     })
 }
 

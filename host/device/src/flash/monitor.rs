@@ -2,6 +2,7 @@
 //! runs. The channel's mode is left as the firmware has it: one that waits for its reader would break its deadlines.
 
 use super::logs::{Decoder, Line, Logs};
+use anyhow::{Context, Result, anyhow};
 use probe_rs::rtt::{self, Rtt, ScanRegion, UpChannel};
 use probe_rs::{Core, CoreStatus, Session};
 use std::io;
@@ -31,47 +32,21 @@ pub enum Event {
     Note(String),
 }
 
-/// The reason for which there is nothing to follow.
-#[derive(Debug, thiserror::Error)]
-pub enum MonitorError {
-    /// The firmware cannot be started.
-    #[error("the firmware cannot be started; check the wiring of the probe, reset above all")]
-    Start(#[source] probe_rs::Error),
-    /// The control block does not appear.
-    #[error(
-        "no RTT control block at {address:#010x} {} s after the start, the core is {status}; did the firmware stop before its \
-        first log, or was it built with another memory.x?", START_TIMEOUT.as_secs()
-    )]
-    NoControlBlock {
-        /// The address where it should be.
-        address: u64,
-        /// The state of the core.
-        status: String,
-    },
-    /// The connection broke before anything was seen.
-    #[error("the connection to the chip broke off before its first log; check the wiring of the probe")]
-    Lost(#[source] rtt::Error),
-    /// Lines cannot be shown.
-    #[error("the log cannot be printed")]
-    Print(#[source] io::Error),
-}
-
 /// Starts the firmware from reset.
 ///
 /// # Errors
 /// If the chip does not do so.
-pub fn start(session: &mut Session, control_block: Option<u64>) -> Result<(), MonitorError> {
-    let mut core = session.core(0).map_err(MonitorError::Start)?;
-    core.reset_and_halt(HALT_TIMEOUT).map_err(MonitorError::Start)?;
-    if let Some(address) = control_block {
-        // One that an earlier firmware left in RAM would be taken for that of this one.
-        match Rtt::clear_control_block(&mut core, &ScanRegion::Exact(address)) {
-            Ok(()) => {}
-            Err(rtt::Error::Probe(error)) => return Err(MonitorError::Start(error)),
-            Err(error) => return Err(MonitorError::Start(probe_rs::Error::Other(error.to_string()))),
+pub fn start(session: &mut Session, control_block: Option<u64>) -> Result<()> {
+    let mut start = || {
+        let mut core = session.core(0)?;
+        core.reset_and_halt(HALT_TIMEOUT)?;
+        if let Some(address) = control_block {
+            // One that an earlier firmware left in RAM would be taken for that of this one.
+            Rtt::clear_control_block(&mut core, &ScanRegion::Exact(address))?;
         }
-    }
-    core.run().map_err(MonitorError::Start)
+        anyhow::Ok(core.run()?)
+    };
+    start().context("the firmware cannot be started; check the wiring of the probe, reset above all")
 }
 
 /// Shows what a running firmware logs until `stop` is set or `show` says that nobody reads any more (a broken pipe).
@@ -86,7 +61,7 @@ pub fn follow(
     logs: &Logs,
     stop: &AtomicBool,
     mut show: impl FnMut(Event) -> io::Result<()>,
-) -> Result<(), MonitorError> {
+) -> Result<()> {
     let mut session = Some(session);
     let mut seen = false;
     let mut reader = Reader { control_block, logs, stop, seen: &mut seen, show: &mut show };
@@ -109,9 +84,16 @@ pub fn follow(
                 reader.note(format!("connection lost ({error}); waiting for it, Ctrl-C ends"))?;
                 session = None;
             }
-            Err(Break::Lost(error)) => return Err(MonitorError::Lost(error)),
-            Err(Break::End(MonitorError::Print(error))) if error.kind() == io::ErrorKind::BrokenPipe => break,
-            Err(Break::End(error)) => return Err(error),
+            Err(Break::Lost(error)) => {
+                return Err(error).context(
+                    "the connection to the chip broke off before its first log; check the wiring of the probe",
+                );
+            }
+            Err(Break::End(error)) => {
+                let printed = error.downcast_ref::<io::Error>();
+                let is_closed = printed.is_some_and(|error| error.kind() == io::ErrorKind::BrokenPipe);
+                return if is_closed { Ok(()) } else { Err(error) };
+            }
         }
     }
     Ok(())
@@ -122,11 +104,11 @@ enum Break {
     /// The probe or the chip is gone.
     Lost(rtt::Error),
     /// For good.
-    End(MonitorError),
+    End(anyhow::Error),
 }
 
-impl From<MonitorError> for Break {
-    fn from(error: MonitorError) -> Self {
+impl From<anyhow::Error> for Break {
+    fn from(error: anyhow::Error) -> Self {
         Self::End(error)
     }
 }
@@ -141,8 +123,8 @@ struct Reader<'a, S> {
 }
 
 impl<S: FnMut(Event) -> io::Result<()>> Reader<'_, S> {
-    fn note(&mut self, text: String) -> Result<(), MonitorError> {
-        (self.show)(Event::Note(text)).map_err(MonitorError::Print)
+    fn note(&mut self, text: String) -> Result<()> {
+        (self.show)(Event::Note(text)).context("the log cannot be printed")
     }
 
     /// Until stopped.
@@ -182,10 +164,15 @@ impl<S: FnMut(Event) -> io::Result<()>> Reader<'_, S> {
             }
             if started.elapsed() > START_TIMEOUT && !told {
                 told = true;
-                let error =
-                    MonitorError::NoControlBlock { address: self.control_block, status: status(core) };
+                let error = format!(
+                    "no RTT control block at {:#010x} {} s after the start, the core is {}; did the firmware stop before its \
+                     first log, or was it built with another memory.x?",
+                    self.control_block,
+                    START_TIMEOUT.as_secs(),
+                    status(core)
+                );
                 if !*self.seen {
-                    return Err(error.into());
+                    return Err(Break::End(anyhow!(error)));
                 }
                 self.note(format!("{error}; still looking"))?;
             }
@@ -239,14 +226,14 @@ impl<S: FnMut(Event) -> io::Result<()>> Reader<'_, S> {
         Ok(false)
     }
 
-    fn decode(&mut self, decoder: &mut Decoder<'_>, bytes: &[u8]) -> Result<(), MonitorError> {
+    fn decode(&mut self, decoder: &mut Decoder<'_>, bytes: &[u8]) -> Result<()> {
         let mut printed = Ok(());
         decoder.push(bytes, |line| {
             if printed.is_ok() {
                 printed = (self.show)(Event::Line(line));
             }
         });
-        printed.map_err(MonitorError::Print)
+        printed.context("the log cannot be printed")
     }
 }
 

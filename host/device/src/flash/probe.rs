@@ -2,127 +2,58 @@
 
 use super::Chip;
 use crate::options::{OptionsError, Words};
+use anyhow::{Context, Result, anyhow, bail};
 use probe_rs::probe::list::{Accessibility, Lister, ProbeListItem};
-use probe_rs::probe::{DebugProbeError, DebugProbeInfo, DebugProbeSelector, Probe};
+use probe_rs::probe::{DebugProbeInfo, DebugProbeSelector, Probe};
 use probe_rs::{Core, MemoryInterface, Permissions, Session};
-use std::fmt::Write as _;
 use std::time::Duration;
 
 /// Longest time that halting may take.
 const HALT_TIMEOUT: Duration = Duration::from_millis(500);
 
-/// The reason for which there is no session.
-#[derive(Debug, thiserror::Error)]
-pub enum ProbeError {
-    /// The text that was asked for is not a selector.
-    #[error(
-        "`{0}` does not select a probe; write VID:PID or VID:PID:SERIAL in hexadecimal, such as 0483:374b"
-    )]
-    BadSelector(String),
-    /// No probe is connected.
-    #[error(
-        "no debug probe found (ST-Link, J-Link, CMSIS-DAP, ...); check that its USB cable carries data and, on Linux, that \
-        udev rules let you use it (https://probe.rs/docs/getting-started/probe-setup)"
-    )]
-    None,
-    /// Probes are connected, but not that one.
-    #[error("no debug probe is `{selector}`; connected are: {}", .connected.join("; "))]
-    NoSuchProbe {
-        /// The text that was asked for.
-        selector: String,
-        /// The probes that are connected.
-        connected: Vec<String>,
-    },
-    /// There is more than one.
-    #[error("{} debug probes are connected; choose one with --probe: {}", .0.len(), .0.join("; "))]
-    Several(Vec<String>),
-    /// This user may not use it.
-    #[error(
-        "the debug probe {0} is there, but you may not use it; install the udev rules of \
-        https://probe.rs/docs/getting-started/probe-setup and plug it in again"
-    )]
-    NoPermission(String),
-    /// It does not open.
-    #[error("the debug probe {probe} cannot be opened; is another program using it?")]
-    Open {
-        /// The probe.
-        probe: String,
-        /// The cause.
-        source: DebugProbeError,
-    },
-    /// The chip does not answer as it should.
-    #[error(
-        "the debug probe {probe} finds no {chip}{voltage}; check supply, SWDIO, SWCLK, ground and reset, and --chip \
-        (under reset: {under_reset})"
-    )]
-    Attach {
-        /// The probe.
-        probe: String,
-        /// The chip.
-        chip: String,
-        /// The supply voltage that the probe measures.
-        voltage: String,
-        /// The error of the second try, with reset held.
-        under_reset: String,
-        /// The error of the first.
-        source: Box<probe_rs::Error>,
-    },
-    /// Another chip answers.
-    #[error(
-        "the connected chip is {found}; nothing was erased; check --chip, which is {chip}, and which board is connected"
-    )]
-    OtherChip {
-        /// The chip that it should be.
-        chip: String,
-        /// The chip that it is.
-        found: String,
-    },
-    /// Its option bytes may be laid out in another way.
-    #[error(
-        "--brown-out knows the option bytes of devices {OPTION_DEVICE:#05x} alone (reference manual RM0090), and not those of \
-        {0}; nothing was changed"
-    )]
-    OtherOptions(String),
-    /// Its option bytes are not as they should be.
-    #[error(transparent)]
-    Options(#[from] OptionsError<probe_rs::Error>),
-    /// It breaks off.
-    #[error("the chip {0} stopped answering; check the wiring")]
-    Lost(String, #[source] Box<probe_rs::Error>),
-}
-
 /// The probe that is meant: the one that is selected, or the only one.
 ///
 /// # Errors
 /// If there is none, or more than one.
-pub fn choose(lister: &Lister, selector: Option<&str>) -> Result<DebugProbeInfo, ProbeError> {
+pub fn choose(lister: &Lister, selector: Option<&str>) -> Result<DebugProbeInfo> {
     let all = lister.list_all_with_access();
     if all.is_empty() {
-        return Err(ProbeError::None);
+        bail!(
+            "no debug probe found (ST-Link, J-Link, CMSIS-DAP, ...); check that its USB cable carries data and, on Linux, that \
+             udev rules let you use it (https://probe.rs/docs/getting-started/probe-setup)"
+        );
     }
-    let matching: Vec<_> = match selector {
-        None => all.clone(),
-        Some(text) => {
-            let wanted: DebugProbeSelector =
-                text.parse().map_err(|_| ProbeError::BadSelector(text.to_owned()))?;
-            all.iter().filter(|item| wanted.matches_probe(&item.info)).cloned().collect()
-        }
+    let wanted: Option<DebugProbeSelector> = match selector {
+        None => None,
+        Some(text) => Some(text.parse().ok().with_context(|| {
+            format!("`{text}` does not select a probe; write VID:PID or VID:PID:SERIAL in hexadecimal, such as 0483:374b")
+        })?),
     };
-    match matching.as_slice() {
-        [] => {
-            let selector = selector.unwrap_or_default().to_owned();
-            Err(ProbeError::NoSuchProbe { selector, connected: describe_all(&all) })
-        }
-        [one] if one.accessibility == Accessibility::PermissionDenied => {
-            Err(ProbeError::NoPermission(describe(&one.info)))
-        }
+    let is_meant =
+        |item: &&ProbeListItem| wanted.as_ref().is_none_or(|wanted| wanted.matches_probe(&item.info));
+    let meant: Vec<_> = all.iter().filter(is_meant).collect();
+    match meant.as_slice() {
+        [] => bail!(
+            "no debug probe is `{}`; connected are: {}",
+            selector.unwrap_or_default(),
+            describe_all(all.iter())
+        ),
+        [one] if one.accessibility == Accessibility::PermissionDenied => bail!(
+            "the debug probe {} is there, but you may not use it; install the udev rules of \
+             https://probe.rs/docs/getting-started/probe-setup and plug it in again",
+            describe(&one.info)
+        ),
         [one] => Ok(one.info.clone()),
-        several => Err(ProbeError::Several(describe_all(several))),
+        several => bail!(
+            "{} debug probes are connected; choose one with --probe: {}",
+            several.len(),
+            describe_all(several.iter().copied())
+        ),
     }
 }
 
-fn describe_all(items: &[ProbeListItem]) -> Vec<String> {
-    items.iter().map(|item| describe(&item.info)).collect()
+fn describe_all<'a>(items: impl Iterator<Item = &'a ProbeListItem>) -> String {
+    items.map(|item| describe(&item.info)).collect::<Vec<_>>().join("; ")
 }
 
 /// Its selector, and what it calls itself.
@@ -136,7 +67,7 @@ pub fn describe(info: &DebugProbeInfo) -> String {
 ///
 /// # Errors
 /// If it is not there, or another one.
-pub fn attach(info: &DebugProbeInfo, chip: &Chip, expected: Option<u32>) -> Result<Session, ProbeError> {
+pub fn attach(info: &DebugProbeInfo, chip: &Chip, expected: Option<u32>) -> Result<Session> {
     let mut probe = open(info)?;
     let voltage = match probe.get_target_voltage() {
         Ok(Some(voltage_v)) => format!(" (its supply is at {voltage_v:.2} V)"),
@@ -145,36 +76,24 @@ pub fn attach(info: &DebugProbeInfo, chip: &Chip, expected: Option<u32>) -> Resu
     let permissions = Permissions::default;
     let mut session = match probe.attach(chip.target().clone(), permissions()) {
         Ok(session) => session,
-        Err(source) => match open(info)?.attach_under_reset(chip.target().clone(), permissions()) {
-            Ok(session) => session,
-            Err(second) => {
-                return Err(ProbeError::Attach {
-                    probe: describe(info),
-                    chip: chip.name().to_owned(),
-                    voltage,
-                    under_reset: chain(&second),
-                    source: Box::new(source),
-                });
-            }
-        },
+        Err(first) => {
+            open(info)?.attach_under_reset(chip.target().clone(), permissions()).map_err(|second| {
+                let (probe, chip, under_reset) = (describe(info), chip.name(), anyhow!(second));
+                anyhow!(first).context(format!(
+                    "the debug probe {probe} finds no {chip}{voltage}; check supply, SWDIO, SWCLK, ground and reset, and --chip \
+                     (under reset: {under_reset:#})"
+                ))
+            })?
+        }
     };
     check_device(&mut session, chip, expected)?;
     Ok(session)
 }
 
-fn open(info: &DebugProbeInfo) -> Result<Probe, ProbeError> {
-    info.open().map_err(|source| ProbeError::Open { probe: describe(info), source })
-}
-
-/// An error with its causes, in one line.
-fn chain(error: &dyn std::error::Error) -> String {
-    let mut text = error.to_string();
-    let mut cause = error.source();
-    while let Some(error) = cause {
-        let _ = write!(text, ": {error}");
-        cause = error.source();
-    }
-    text
+fn open(info: &DebugProbeInfo) -> Result<Probe> {
+    info.open().with_context(|| {
+        format!("the debug probe {} cannot be opened; is another program using it?", describe(info))
+    })
 }
 
 /// DBGMCU_IDCODE of the STM32F4 (RM0090, 38.6.1): the device in its low 12 bits.
@@ -230,18 +149,28 @@ pub fn with_options<T>(
     session: &mut Session,
     chip: &Chip,
     act: impl FnOnce(&mut Halted<'_, '_>) -> Result<T, OptionsError<probe_rs::Error>>,
-) -> Result<T, ProbeError> {
-    let lost = |error| ProbeError::Lost(chip.name().to_owned(), Box::new(error));
+) -> Result<T> {
+    let other = |chip: String| {
+        anyhow!(
+            "--brown-out knows the option bytes of devices {OPTION_DEVICE:#05x} alone (reference manual RM0090), and not those of \
+             {chip}; nothing was changed"
+        )
+    };
     if !has_idcode(chip) {
-        return Err(ProbeError::OtherOptions(chip.name().to_owned()));
+        return Err(other(chip.name().to_owned()));
     }
-    let mut core = session.core(0).map_err(lost)?;
-    let found = device(core.read_word_32(DBGMCU_IDCODE).map_err(lost)?);
+    let lost = || lost(chip);
+    let mut core = session.core(0).with_context(lost)?;
+    let found = device(core.read_word_32(DBGMCU_IDCODE).with_context(lost)?);
     if found != OPTION_DEVICE {
-        return Err(ProbeError::OtherOptions(format!("a device {found:#05x}")));
+        return Err(other(format!("a device {found:#05x}")));
     }
-    core.halt(HALT_TIMEOUT).map_err(lost)?;
+    core.halt(HALT_TIMEOUT).with_context(lost)?;
     Ok(act(&mut Halted(&mut core))?)
+}
+
+fn lost(chip: &Chip) -> String {
+    format!("the chip {} stopped answering; check the wiring", chip.name())
 }
 
 /// Returns `true` if it has the two registers that are looked at where those of an STM32F4 are.
@@ -249,17 +178,20 @@ fn has_idcode(chip: &Chip) -> bool {
     chip.name().to_ascii_uppercase().starts_with("STM32F4")
 }
 
-fn check_device(session: &mut Session, chip: &Chip, expected: Option<u32>) -> Result<(), ProbeError> {
-    let lost = |error| ProbeError::Lost(chip.name().to_owned(), Box::new(error));
+fn check_device(session: &mut Session, chip: &Chip, expected: Option<u32>) -> Result<()> {
     if !has_idcode(chip) {
         return Ok(());
     }
-    let mut core = session.core(0).map_err(lost)?;
-    let idcode = core.read_word_32(DBGMCU_IDCODE).map_err(lost)?;
-    let flash_kib = core.read_word_16(FLASH_SIZE_KIB).map_err(lost)?;
+    let lost = || lost(chip);
+    let mut core = session.core(0).with_context(lost)?;
+    let idcode = core.read_word_32(DBGMCU_IDCODE).with_context(lost)?;
+    let flash_kib = core.read_word_16(FLASH_SIZE_KIB).with_context(lost)?;
     let flash = &chip.memory().flash;
-    match contradiction(expected, flash.end - flash.start, idcode, flash_kib) {
-        Some(found) => Err(ProbeError::OtherChip { chip: chip.name().to_owned(), found }),
-        None => Ok(()),
+    if let Some(found) = contradiction(expected, flash.end - flash.start, idcode, flash_kib) {
+        let chip = chip.name();
+        bail!(
+            "the connected chip is {found}; nothing was erased; check --chip, which is {chip}, and which board is connected"
+        );
     }
+    Ok(())
 }
