@@ -2,9 +2,8 @@
 //! goes on from there.
 //!
 //! It is a magic word and frames: a length, a checksum, and the postcard bytes of the [`Identity`] (the first frame) or of a
-//! [`Row`]. A row is appended in one piece once its run is done. Checksums go on from that of the identity, so that a row is
-//! believed in its own journal only. What is not whole at the end is dropped, and run again. This holds against programs that
-//! are killed, not against a power failure: nothing is forced to the disk.
+//! [`Row`]. A row is appended in one piece once its run is done. What is not whole at the end is dropped, and run again. This
+//! holds against programs that are killed, not against a power failure: nothing is forced to the disk.
 
 use super::identity::{Identity, checksum};
 use super::run::Row;
@@ -15,14 +14,12 @@ use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 use thiserror::Error;
 
-const MAGIC: &[u8; 8] = b"BGSWEEP1";
+const MAGIC: &[u8; 8] = b"BGSWEEP2";
 
 /// A journal that is being written.
 #[derive(Debug)]
 pub struct Journal {
     path: PathBuf,
-    /// The value that checksums go on from.
-    seed: u64,
     end: Mutex<End>,
 }
 
@@ -94,18 +91,18 @@ impl Journal {
         if !force {
             file.read_to_end(&mut bytes).map_err(failed)?;
         }
-        let opening = frame(0, identity).map_err(failed)?;
-        let seed = checksum(0, &opening);
+        let opening = frame(identity).map_err(failed)?;
         let mut found = Found::default();
         let whole = match begun(&bytes) {
             Begun::Not => 0,
             Begun::Otherwise => return Err(JournalError::NoJournal { path: path.to_owned() }),
             Begun::By(another, rest) => {
                 if let Some(difference) = identity.difference(&another) {
+                    let difference = difference.to_owned();
                     return Err(JournalError::Another { path: path.to_owned(), difference });
                 }
                 let mut rest = rest;
-                while let Some((row, behind)) = next(seed, rest) {
+                while let Some((row, behind)) = next(rest) {
                     found.rows.push(row);
                     rest = behind;
                 }
@@ -113,7 +110,7 @@ impl Journal {
                 (bytes.len() - rest.len()) as u64
             }
         };
-        let journal = Self { path: path.to_owned(), seed, end: Mutex::new(End { file, length: whole }) };
+        let journal = Self { path: path.to_owned(), end: Mutex::new(End { file, length: whole }) };
         journal.cut()?;
         if whole == 0 {
             journal.put(&[MAGIC, &opening[..]].concat())?;
@@ -131,7 +128,7 @@ impl Journal {
     /// # Errors
     /// What the file system says. What was kept before stays.
     pub fn keep(&self, row: &Row) -> Result<(), JournalError> {
-        let bytes = frame(self.seed, row).map_err(|source| self.failed(source))?;
+        let bytes = frame(row).map_err(|source| self.failed(source))?;
         self.put(&bytes)
     }
 
@@ -180,7 +177,7 @@ enum Begun<'a> {
 
 fn begun(bytes: &[u8]) -> Begun<'_> {
     match bytes.strip_prefix(MAGIC) {
-        Some(rest) => match next(0, rest) {
+        Some(rest) => match next(rest) {
             Some((identity, rest)) => Begun::By(identity, rest),
             // Killed in its first moment, or damaged.
             None if payload(rest).is_none() => Begun::Not,
@@ -192,10 +189,10 @@ fn begun(bytes: &[u8]) -> Begun<'_> {
 }
 
 /// A value with its length and checksum.
-fn frame(seed: u64, value: &impl Serialize) -> io::Result<Vec<u8>> {
+fn frame(value: &impl Serialize) -> io::Result<Vec<u8>> {
     let payload = postcard::to_stdvec(value).map_err(io::Error::other)?;
     let length = u32::try_from(payload.len()).map_err(io::Error::other)?;
-    Ok([&length.to_le_bytes()[..], &checksum(seed, &payload).to_le_bytes(), &payload].concat())
+    Ok([&length.to_le_bytes()[..], &checksum(&payload).to_le_bytes(), &payload].concat())
 }
 
 /// Checksum and payload of the first frame, and what is behind it, if it is there to its end.
@@ -207,9 +204,9 @@ fn payload(bytes: &[u8]) -> Option<(u64, &[u8], &[u8])> {
 }
 
 /// The first value, and what is behind it, if it is whole.
-fn next<T: DeserializeOwned>(seed: u64, bytes: &[u8]) -> Option<(T, &[u8])> {
+fn next<T: DeserializeOwned>(bytes: &[u8]) -> Option<(T, &[u8])> {
     let (sum, payload, rest) = payload(bytes)?;
-    if checksum(seed, payload) != sum {
+    if checksum(payload) != sum {
         return None;
     }
     match postcard::take_from_bytes(payload) {

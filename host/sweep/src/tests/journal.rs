@@ -125,23 +125,6 @@ fn a_damaged_journal_gives_no_wrong_row() {
     assert!(refused > 10 && kept > 3000, "{refused} refused, {kept} rows kept: not much of a test");
 }
 
-/// Rows of one journal mean nothing in another.
-#[test]
-fn rows_are_believed_in_their_own_journal_only() {
-    let (_folder, path) = folder();
-    let (one, other) = (identity("control.force_n=1..2:2"), identity("control.force_n=1..3:2"));
-    let rows = rows(3);
-    write(&path, &other, &rows);
-    let of_other = fs::read(&path).unwrap();
-    write(&path, &other, &[]);
-    let opening = fs::read(&path).unwrap().len();
-    write(&path, &one, &[]);
-    let spliced = [fs::read(&path).unwrap(), of_other[opening..].to_vec()].concat();
-    fs::write(&path, spliced).unwrap();
-    let (_, found) = Journal::open(&path, &one, false).unwrap();
-    assert!(found.rows.is_empty() && found.dropped > 100);
-}
-
 #[test]
 fn the_journal_of_another_sweep_is_refused_with_what_differs() {
     let (folder, path) = folder();
