@@ -29,7 +29,7 @@ fn reaches_wherever_some_posture_reaches() {
         let angles: Vec<f64> = (0..12)
             .map(|k| {
                 let (lower, upper) = hand.range_rad(k);
-                lower + (upper - lower) * numbers.next()
+                lower + (upper - lower) * numbers.unit()
             })
             .collect();
         let targets = centres(&hand, &angles);

@@ -4,7 +4,7 @@ use crate::file::ShapeFile;
 use crate::mesh::{Unit, load};
 use crate::{ObjectFile, Scene, object};
 use blindgrasp_meshes::{Mesh, bracket};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 const OBJECT: &str = "schema = 1\nname = \"part\"\ndensity_kg_m3 = 20\n[shape.mesh]\n";
 
