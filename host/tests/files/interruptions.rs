@@ -1,6 +1,6 @@
 //! Interruptions at random moments, over every command that writes.
 //!
-//!     cargo test --release -p blindgrasp --test files -- --ignored --nocapture
+//!     cargo test --release -p blindgrasp --features full --test command interrupted_300 -- --ignored --nocapture
 
 use super::{blindgrasp, inputs, names, run, told};
 use nix::sys::signal::{Signal, kill};
@@ -39,6 +39,7 @@ const COMMANDS: &[(&[&str], &[&str])] = &[
     (&["scene", "new", "three-finger", "cube", "--out", "out.toml"], &["out.toml"]),
     (&["recording", "finish", "../run.mcap", "--out", "out.mcap"], &["out.mcap"]),
     (&["record", "--port", "../link", "--duration", "1", "--out", "out.mcap"], &["out.mcap"]),
+    (&["console", "--port", "../link", "--out", "out.mcap"], &["out.mcap"]),
 ];
 
 /// What is there before, and is replaced by force.
@@ -164,7 +165,7 @@ fn interrupt(times: usize, seed: u64) {
         assert!(files.len() >= written.len(), "{arguments:?}");
         let kib = files.values().map(|bytes| bytes.len() as u64).sum::<u64>() >> 10;
         // What is recorded in real time is another each time.
-        files.retain(|_, _| arguments[0] != "record");
+        files.retain(|_, _| !["record", "console"].contains(&arguments[0]));
         undisturbed.push((files, begun.elapsed(), kib));
     }
     let mut counts: BTreeMap<How, [u32; 4]> = BTreeMap::new();
