@@ -1,82 +1,116 @@
-//! The decoded channels as protobuf. Ticks are written field by field, because their message is made for the hand and
-//! comes a thousand times a second; what is rare goes through `prost`.
+//! The decoded channels as protobuf.
 
+use super::Stamp;
 use super::decoder::Decoded;
-use super::schema::JOINTS;
+use super::protobuf::{double, float, nested, read, signed, text, whole};
+use super::schema::{JOINTS, Type};
 use blindgrasp_shared::limit::Limit;
 use blindgrasp_shared::parameters::Each;
 use blindgrasp_shared::signals::Value;
 
 /// The severity of an event.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, prost::Enumeration)]
-#[repr(i32)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Level {
     /// Not told.
-    Unknown = 0,
+    Unknown,
     /// For finding errors.
-    Debug = 1,
+    Debug,
     /// Good to know.
-    Info = 2,
+    Info,
     /// Something may be wrong.
-    Warning = 3,
+    Warning,
     /// Something is wrong.
-    Error = 4,
+    Error,
     /// Nothing goes on.
-    Fatal = 5,
+    Fatal,
 }
 
-/// `foxglove.Log`.
-#[derive(Clone, PartialEq, prost::Message)]
-pub(super) struct Log {
-    #[prost(message, optional, tag = "1")]
-    pub(super) timestamp: Option<prost_types::Timestamp>,
-    #[prost(enumeration = "Level", tag = "2")]
-    pub(super) level: i32,
-    #[prost(string, tag = "3")]
-    pub(super) message: String,
-    #[prost(string, tag = "4")]
-    pub(super) name: String,
+impl Level {
+    /// All, in the order of their numbers.
+    pub(super) const ALL: [Self; 6] =
+        [Self::Unknown, Self::Debug, Self::Info, Self::Warning, Self::Error, Self::Fatal];
 }
 
-/// The link in the last second.
-#[derive(Clone, Copy, PartialEq, prost::Message)]
-pub struct LinkStatus {
-    /// Time that this tells of, s.
-    #[prost(double, tag = "1")]
-    pub seconds_s: f64,
-    /// Bytes of the good frames that came.
-    #[prost(uint64, tag = "2")]
-    pub bytes: u64,
-    /// Good frames that came.
-    #[prost(uint64, tag = "3")]
-    pub frames: u64,
-    /// Frames that came damaged, each of which may have been a record.
-    #[prost(uint64, tag = "4")]
-    pub damaged: u64,
-    /// Records that came and could be decoded, input records among them.
-    #[prost(uint64, tag = "5")]
-    pub records: u64,
-    /// Records that are missing, by the numbers of those that came.
-    #[prost(uint64, tag = "6")]
-    pub missing: u64,
-    /// Records and answers that the device lost because a queue was full.
-    #[prost(uint64, tag = "7")]
-    pub dropped: u64,
-    /// Frames that came whole and can't be decoded.
-    #[prost(uint64, tag = "8")]
-    pub unusable: u64,
-    /// Decoded records a second.
-    #[prost(double, tag = "9")]
-    pub rate_hz: f64,
-    /// Ticks from one record that was asked for to the next, as the device told last; 1 with input records.
-    #[prost(uint32, tag = "10")]
-    pub decimation: u32,
-    /// Share of the line's time that the frames took; NaN where its speed is not known.
-    #[prost(double, tag = "11")]
-    pub share: f64,
-    /// Input records that came, of which a replay makes full ones.
-    #[prost(uint64, tag = "12")]
-    pub inputs: u64,
+/// Returns an event as a `foxglove.Log`.
+pub(super) fn write_event(at: Stamp, level: Level, about: &str, words: &str) -> Vec<u8> {
+    let mut buffer = Vec::new();
+    write_time(&mut buffer, at);
+    whole(&mut buffer, 2, level as u64);
+    text(&mut buffer, 3, words);
+    text(&mut buffer, 4, about);
+    buffer
+}
+
+/// Returns the level, the subject and the words of an event; `None` if its bytes are damaged.
+pub(super) fn read_event(bytes: &[u8]) -> Option<(Level, &str, &str)> {
+    let mut event = (Level::Unknown, "", "");
+    for (number, value) in read(bytes)? {
+        match number {
+            2 => event.0 = *Level::ALL.get(value.whole? as usize).unwrap_or(&Level::Unknown),
+            3 => event.2 = value.text?,
+            4 => event.1 = value.text?,
+            _ => {}
+        }
+    }
+    Some(event)
+}
+
+/// A time, which is the first field of every message that has one.
+pub(super) fn write_time(buffer: &mut Vec<u8>, at: Stamp) {
+    nested(buffer, 1, |buffer| {
+        whole(buffer, 1, at.0 / 1_000_000_000);
+        whole(buffer, 2, at.0 % 1_000_000_000);
+    });
+}
+
+macro_rules! link_status {
+    ($($number:literal, $name:ident, $type:ty, $write:ident, $kind:ident, $unit:literal, $words:literal;)*) => {
+        /// The link in the last second.
+        #[derive(Clone, Copy, Debug, Default, PartialEq)]
+        pub struct LinkStatus {
+            $(#[doc = concat!($words, ".")] pub $name: $type,)*
+        }
+
+        impl LinkStatus {
+            /// Number, name and type of each field, its unit, and what it is in words.
+            pub(super) const SIGNALS: &[(u32, &str, Type, &str, &str)] =
+                &[$(($number, stringify!($name), Type::$kind, $unit, $words)),*];
+
+            pub(super) fn write(&self) -> Vec<u8> {
+                let mut buffer = Vec::new();
+                $($write(&mut buffer, $number, self.$name.into());)*
+                buffer
+            }
+
+            /// Reads what [`Self::write`] wrote; `None` if the bytes are damaged.
+            pub(super) fn read(bytes: &[u8]) -> Option<Self> {
+                let mut status = Self::default();
+                for (number, value) in read(bytes)? {
+                    match number {
+                        $($number => status.$name = value.$write? as $type,)*
+                        _ => {}
+                    }
+                }
+                Some(status)
+            }
+        }
+    };
+}
+
+#[rustfmt::skip]
+link_status! {
+     1, seconds_s,  f64, double, Double, "s",     "Time that this tells of";
+     2, bytes,      u64, whole,  Uint64, "bytes", "Bytes of the good frames that came";
+     3, frames,     u64, whole,  Uint64, "",      "Good frames that came";
+     4, damaged,    u64, whole,  Uint64, "",      "Frames that came damaged, each of which may have been a record";
+     5, records,    u64, whole,  Uint64, "",      "Records that came and could be decoded, input records among them";
+     6, missing,    u64, whole,  Uint64, "",      "Records that are missing, by the numbers of those that came";
+     7, dropped,    u64, whole,  Uint64, "",      "Records and answers that the device lost because a queue was full";
+     8, unusable,   u64, whole,  Uint64, "",      "Frames that came whole and can't be decoded";
+     9, rate_hz,    f64, double, Double, "1/s",   "Decoded records a second";
+    10, decimation, u32, whole,  Uint32, "ticks", "Ticks from one record that was asked for to the next; 1 where input records tell of the ticks between, as the device told last";
+    11, share,      f64, double, Double, "1",     "Share of the line's time that the frames took; NaN where its speed is not known";
+    12, inputs,     u64, whole,  Uint64, "",      "Input records that came, of which a replay makes full ones";
 }
 
 impl LinkStatus {
@@ -86,12 +120,6 @@ impl LinkStatus {
         self.missing.saturating_sub(self.dropped)
     }
 }
-
-/// Wire types of protobuf.
-const VARINT: u32 = 0;
-const EIGHT_BYTES: u32 = 1;
-const LENGTH: u32 = 2;
-const FOUR_BYTES: u32 = 5;
 
 /// Writes a tick into a buffer, in the order and with the numbers of [`tick_signals`](super::schema::tick_signals).
 /// `joint_names` are those that a fault names.
@@ -139,11 +167,7 @@ fn write_value(buffer: &mut Vec<u8>, number: u32, value: Value<'_>, joint_names:
     match value {
         Value::Missing | Value::Counts(_) | Value::Reals(_) | Value::Limits(_) => {}
         Value::Whole(value) => whole(buffer, number, value.into()),
-        Value::Count(count) => {
-            key(buffer, number, VARINT);
-            // Small numbers of either sign in few bytes.
-            varint(buffer, u64::from((count.wrapping_shl(1) ^ (count >> 31)) as u32));
-        }
+        Value::Count(count) => signed(buffer, number, count),
         Value::Real(value) => float(buffer, number, value),
         Value::Truth(value) => whole(buffer, number, value.into()),
         Value::Mode(mode) => whole(buffer, number, mode as u64),
@@ -156,66 +180,4 @@ fn write_value(buffer: &mut Vec<u8>, number: u32, value: Value<'_>, joint_names:
         Value::Answer(answer) => text(buffer, number, &answer.to_string()),
         Value::Limiting(limiting) => text(buffer, number, &limiting.to_string()),
     }
-}
-
-pub(super) fn text(buffer: &mut Vec<u8>, number: u32, text: &str) {
-    key(buffer, number, LENGTH);
-    varint(buffer, text.len() as u64);
-    buffer.extend_from_slice(text.as_bytes());
-}
-
-/// A message in a message. Its length stands before it: a byte if it is short, as a joint's always is; otherwise the
-/// message moves up.
-pub(super) fn nested(buffer: &mut Vec<u8>, number: u32, fill: impl FnOnce(&mut Vec<u8>)) {
-    key(buffer, number, LENGTH);
-    let at = buffer.len();
-    buffer.push(0);
-    fill(buffer);
-    let length = buffer.len() - at - 1;
-    if length < 0x80 {
-        buffer[at] = length as u8;
-    } else {
-        let mut bytes = Vec::with_capacity(4);
-        varint(&mut bytes, length as u64);
-        buffer.splice(at..=at, bytes);
-    }
-}
-
-/// A whole number or a truth value; zero is not written, as is the rule.
-pub(super) fn whole(buffer: &mut Vec<u8>, number: u32, value: u64) {
-    if value != 0 {
-        key(buffer, number, VARINT);
-        varint(buffer, value);
-    }
-}
-
-fn float(buffer: &mut Vec<u8>, number: u32, value: f32) {
-    if value.to_bits() != 0 {
-        key(buffer, number, FOUR_BYTES);
-        buffer.extend_from_slice(&value.to_le_bytes());
-    }
-}
-
-pub(super) fn double(buffer: &mut Vec<u8>, number: u32, value: f64) {
-    if value.to_bits() != 0 {
-        present_double(buffer, number, value);
-    }
-}
-
-/// A number that could be absent: zero is written, too.
-pub(super) fn present_double(buffer: &mut Vec<u8>, number: u32, value: f64) {
-    key(buffer, number, EIGHT_BYTES);
-    buffer.extend_from_slice(&value.to_le_bytes());
-}
-
-fn key(buffer: &mut Vec<u8>, number: u32, wire_type: u32) {
-    varint(buffer, u64::from(number << 3 | wire_type));
-}
-
-fn varint(buffer: &mut Vec<u8>, mut value: u64) {
-    while value >= 0x80 {
-        buffer.push(value as u8 | 0x80);
-        value >>= 7;
-    }
-    buffer.push(value as u8);
 }

@@ -39,6 +39,7 @@ mod error;
 mod file;
 mod finish;
 mod message;
+mod protobuf;
 mod reader;
 mod salvage;
 mod schema;

@@ -2,13 +2,12 @@
 
 use super::about::{About, Setting};
 use super::error::RecordingError;
-use super::message::{Level, LinkStatus, Log};
+use super::message::{Level, LinkStatus, read_event};
 use super::salvage::{Piece, Pieces, string};
 use super::writer::GAP;
 use super::{CHANNELS, Device, FORMAT, Kind, PROFILE, Stamp, twin};
 use ::mcap::records::op;
 use blindgrasp_files as files;
-use prost::Message;
 use std::collections::{BTreeMap, HashMap, VecDeque};
 use std::fs::File;
 use std::io::{self, Read, Seek, SeekFrom};
@@ -452,11 +451,11 @@ fn what(kind: Kind, data: &[u8], ticks: bool) -> Option<What> {
         Kind::Received => Some(What::Received(data.to_vec())),
         Kind::Sent => Some(What::Sent(data.to_vec())),
         Kind::Tick => Some(What::Tick(if ticks { data.to_vec() } else { Vec::new() })),
-        Kind::Event => Log::decode(data).ok().map(|log| match log.name.as_str() {
-            GAP => What::Gap { words: log.message },
-            _ => What::Event { level: log.level(), about: log.name, words: log.message },
+        Kind::Event => read_event(data).map(|(level, about, words)| match about {
+            GAP => What::Gap { words: words.into() },
+            _ => What::Event { level, about: about.into(), words: words.into() },
         }),
-        Kind::Link => LinkStatus::decode(data).ok().map(What::Link),
+        Kind::Link => LinkStatus::read(data).map(What::Link),
         Kind::About => serde_json::from_slice(data).ok().map(|about| What::About(Box::new(about))),
         Kind::Parameters => Setting::from_json(data).map(What::Parameters),
     }

@@ -3,6 +3,8 @@
 //! The fields of a tick are those of the tables of signals, in their order: [`tick_signals`] numbers them, for the
 //! descriptors, the signal table and the encoding.
 
+use super::message::{Level, LinkStatus};
+use super::protobuf::{nested, present_whole, text, whole};
 use crate::derived::Derived;
 use blindgrasp_shared::control::Signal;
 use blindgrasp_shared::fault::Fault;
@@ -11,12 +13,6 @@ use blindgrasp_shared::parameters::Each;
 use blindgrasp_shared::signals::Kind;
 use blindgrasp_shared::supervisor::Mode;
 use blindgrasp_wire::Record;
-use prost::Message;
-use prost_types::field_descriptor_proto::{Label, Type};
-use prost_types::{
-    DescriptorProto, EnumDescriptorProto, EnumValueDescriptorProto, FieldDescriptorProto,
-    FileDescriptorProto, FileDescriptorSet,
-};
 use serde_json::{Value, json};
 
 /// Name of the schema of events.
@@ -93,46 +89,6 @@ pub(super) fn tick_signals() -> Vec<TickSignal> {
     signals
 }
 
-/// A signal of the link: a field of a message.
-pub(super) struct LinkSignal {
-    pub(super) number: u32,
-    pub(super) name: &'static str,
-    kind: Type,
-    unit: &'static str,
-    words: &'static str,
-}
-
-macro_rules! signals {
-    ($(#[$doc:meta])* $module:ident: $($constant:ident = $number:literal, $name:literal, $kind:ident, $unit:literal, $words:literal;)*) => {
-        $(#[$doc])*
-        pub(super) mod $module {
-            use super::{LinkSignal, Type};
-            $(pub(in super::super) const $constant: u32 = $number;)*
-            pub(in super::super) const ALL: &[LinkSignal] = &[$(LinkSignal {
-                number: $constant, name: $name, kind: Type::$kind, unit: $unit, words: $words,
-            }),*];
-        }
-    };
-}
-
-#[rustfmt::skip]
-signals! {
-    /// Of the link.
-    link:
-    SECONDS             =  1, "seconds_s",            Double, "s",      "Time that this tells of";
-    BYTES               =  2, "bytes",                Uint64, "bytes",  "Bytes of the good frames that came";
-    FRAMES              =  3, "frames",               Uint64, "",       "Good frames that came";
-    DAMAGED             =  4, "damaged",              Uint64, "",       "Frames that came damaged, each of which may have been a record";
-    RECORDS             =  5, "records",              Uint64, "",       "Records that came and could be decoded, input records among them";
-    MISSING             =  6, "missing",              Uint64, "",       "Records that are missing, by the numbers of those that came";
-    DROPPED             =  7, "dropped",              Uint64, "",       "Records and answers that the device lost because a queue was full";
-    UNUSABLE            =  8, "unusable",             Uint64, "",       "Frames that came whole and can't be decoded";
-    RATE_HZ             =  9, "rate_hz",              Double, "1/s",    "Decoded records a second";
-    DECIMATION          = 10, "decimation",           Uint32, "ticks",  "Ticks from one record that was asked for to the next; 1 where input records tell of the ticks between, as the device told last";
-    SHARE               = 11, "share",                Double, "1",      "Share of the line's time that the frames took; NaN where its speed is not known";
-    INPUTS              = 12, "inputs",               Uint64, "",       "Input records that came, of which a replay makes full ones";
-}
-
 /// A name that protobuf takes for a field: letters, digits, underscores.
 fn identifier(name: &str) -> String {
     let mut identifier: String =
@@ -163,43 +119,34 @@ pub(super) fn joint_fields(names: &[String]) -> Vec<String> {
 pub(super) fn of_hand(hand: &str, joint_names: &[String]) -> (String, Vec<u8>) {
     let package = format!("blindgrasp.{}", identifier(hand).to_lowercase());
     let full = |name: &str| format!(".{package}.Tick.{name}");
-    let typed = |signal: &TickSignal| {
-        let name = match signal.kind {
-            FieldKind::Told(Kind::Mode) => Some("Mode"),
-            FieldKind::Told(Kind::Fault) => Some("Fault"),
-            _ => None,
-        };
-        let field = field(&signal.name, signal.number as i32, signal.kind.proto());
-        FieldDescriptorProto { type_name: name.map(full), ..field }
+    let described = |signal: &TickSignal| Field {
+        type_name: match signal.kind {
+            FieldKind::Told(Kind::Mode) => full("Mode"),
+            FieldKind::Told(Kind::Fault) => full("Fault"),
+            _ => String::new(),
+        },
+        // It is missing where angles came from elsewhere.
+        optional: signal.kind == FieldKind::Told(Kind::Count),
+        ..field(&signal.name, signal.number, signal.kind.proto())
     };
     let signals = tick_signals();
-    let of = |each| signals.iter().filter(move |signal| signal.each == each).map(typed).collect::<Vec<_>>();
-    let mut tick_fields = of(Each::Hand);
-    tick_fields.push(FieldDescriptorProto {
-        type_name: Some(full("Joints")),
-        ..field("joints", JOINTS as i32, Type::Message)
-    });
-    let joint_message = message("Joint", of(Each::Joint));
-    let of_joints = joint_fields(joint_names).into_iter().zip(1..);
-    let joints = of_joints
-        .map(|(name, number)| FieldDescriptorProto {
-            type_name: Some(full("Joint")),
-            ..field(&name, number, Type::Message)
-        })
-        .collect();
-    let modes = Mode::ALL.iter().map(|mode| (mode.words().to_uppercase(), *mode as i32));
+    let of = |each| signals.iter().filter(move |signal| signal.each == each).map(described).collect();
+    let mut tick_fields: Vec<Field> = of(Each::Hand);
+    tick_fields.push(typed("joints", JOINTS, Type::Message, full("Joints")));
+    let joints = joint_fields(joint_names).into_iter().zip(1..);
+    let joints = joints.map(|(name, number)| typed(&name, number, Type::Message, full("Joint")));
+    let modes = Mode::ALL.iter().map(|mode| (mode.words().to_uppercase(), *mode as u64));
     let faults =
-        Fault::ALL.iter().map(|fault| (upper_case(&format!("{fault:?}")), i32::from(fault.number())));
-    let tick = DescriptorProto {
-        nested_type: vec![joint_message, message("Joints", joints)],
-        enum_type: vec![
-            enumeration("Mode", modes),
-            enumeration("Fault", std::iter::once(("NO_FAULT".into(), 0)).chain(faults)),
+        Fault::ALL.iter().map(|fault| (upper_case(&format!("{fault:?}")), u64::from(fault.number())));
+    let tick = Message {
+        nested: vec![message("Joint", of(Each::Joint)), message("Joints", joints.collect())],
+        enums: vec![
+            ("Mode", modes.collect()),
+            ("Fault", std::iter::once(("NO_FAULT".into(), 0)).chain(faults).collect()),
         ],
         ..message("Tick", tick_fields)
     };
-    let file = file(&package, vec![tick]);
-    (format!("{package}.Tick"), FileDescriptorSet { file: vec![file] }.encode_to_vec())
+    (format!("{package}.Tick"), file(&package, &package, "", &[tick]))
 }
 
 /// Name, encoding and bytes of the schema of a channel that is the same for every hand; none of what has none.
@@ -223,33 +170,22 @@ pub(super) fn encoding(of_schema: &str) -> &'static str {
 
 /// The schema of the link's state.
 fn of_link() -> Vec<u8> {
-    let file = file("blindgrasp", vec![message("Link", fields(link::ALL))]);
-    FileDescriptorSet { file: vec![file] }.encode_to_vec()
+    let fields = LinkStatus::SIGNALS.iter().map(|&(number, name, kind, ..)| field(name, number, kind));
+    file("blindgrasp", "blindgrasp", "", &[message("Link", fields.collect())])
 }
 
 /// The schema of events, which viewers know.
 fn of_log() -> Vec<u8> {
-    let levels = ["UNKNOWN", "DEBUG", "INFO", "WARNING", "ERROR", "FATAL"];
-    let log = DescriptorProto {
-        enum_type: vec![enumeration("Level", levels.iter().map(|&name| name.to_owned()).zip(0..))],
-        ..message(
-            "Log",
-            vec![
-                typed(field("timestamp", 1, Type::Message), ".google.protobuf.Timestamp"),
-                typed(field("level", 2, Type::Enum), ".foxglove.Log.Level"),
-                field("message", 3, Type::String),
-                field("name", 4, Type::String),
-                field("file", 5, Type::String),
-                field("line", 6, Type::Fixed32),
-            ],
-        )
-    };
-    let log = FileDescriptorProto {
-        name: Some("foxglove/Log.proto".into()),
-        dependency: vec![TIMESTAMP.into()],
-        ..file("foxglove", vec![log])
-    };
-    FileDescriptorSet { file: vec![timestamp(), log] }.encode_to_vec()
+    let fields = vec![
+        time(),
+        typed("level", 2, Type::Enum, ".foxglove.Log.Level".into()),
+        field("message", 3, Type::String),
+        field("name", 4, Type::String),
+        field("file", 5, Type::String),
+        field("line", 6, Type::Fixed32),
+    ];
+    let levels = Level::ALL.map(|level| (upper_case(&format!("{level:?}")), level as u64));
+    timed(LOG, &[Message { enums: vec![("Level", levels.into())], ..message("Log", fields) }])
 }
 
 /// JSON schema of what a device is.
@@ -313,81 +249,120 @@ pub(super) fn signal_table() -> Value {
         let path = if signal.each == Each::Joint { "joints.<joint>." } else { "" };
         row(&format!("{path}{}", signal.name), signal.unit, signal.words)
     });
-    let of_link = link::ALL.iter().map(|signal| row(signal.name, signal.unit, signal.words));
+    let of_link = LinkStatus::SIGNALS.iter().map(|(_, name, _, unit, words)| row(name, unit, words));
     json!({ "tick": of_tick.collect::<Vec<_>>(), "link": of_link.collect::<Vec<_>>() })
 }
 
-fn fields(signals: &[LinkSignal]) -> Vec<FieldDescriptorProto> {
-    signals.iter().map(|signal| field(signal.name, signal.number as i32, signal.kind)).collect()
+/// A type of a field, with the number that it has in descriptors.
+#[derive(Clone, Copy)]
+pub(super) enum Type {
+    Double = 1,
+    Float = 2,
+    Int64 = 3,
+    Uint64 = 4,
+    Int32 = 5,
+    Fixed32 = 7,
+    Bool = 8,
+    String = 9,
+    Message = 11,
+    Uint32 = 13,
+    Enum = 14,
+    Sint32 = 17,
 }
 
-/// The file of protobuf's own times.
-pub(super) const TIMESTAMP: &str = "google/protobuf/timestamp.proto";
+/// A field of a message.
+pub(super) struct Field {
+    pub(super) name: String,
+    pub(super) number: u32,
+    pub(super) kind: Type,
+    /// Name of the message or enumeration, if it is one.
+    pub(super) type_name: String,
+    pub(super) repeated: bool,
+    pub(super) optional: bool,
+}
 
-/// Protobuf's own times.
-pub(super) fn timestamp() -> FileDescriptorProto {
-    let fields = vec![field("seconds", 1, Type::Int64), field("nanos", 2, Type::Int32)];
-    FileDescriptorProto {
-        name: Some(TIMESTAMP.into()),
-        ..file("google.protobuf", vec![message("Timestamp", fields)])
-    }
+/// A message, with the messages and the enumerations in it.
+pub(super) struct Message {
+    name: String,
+    fields: Vec<Field>,
+    nested: Vec<Message>,
+    enums: Vec<(&'static str, Vec<(String, u64)>)>,
+}
+
+pub(super) fn field(name: &str, number: u32, kind: Type) -> Field {
+    typed(name, number, kind, String::new())
 }
 
 /// A field that is a message or an enumeration of this name.
-pub(super) fn typed(field: FieldDescriptorProto, name: &str) -> FieldDescriptorProto {
-    FieldDescriptorProto { type_name: Some(name.into()), ..field }
+pub(super) fn typed(name: &str, number: u32, kind: Type, type_name: String) -> Field {
+    Field { name: name.into(), number, kind, type_name, repeated: false, optional: false }
 }
 
-pub(super) fn field(name: &str, number: i32, kind: Type) -> FieldDescriptorProto {
-    FieldDescriptorProto {
-        name: Some(name.into()),
-        number: Some(number),
-        label: Some(Label::Optional.into()),
-        r#type: Some(kind.into()),
-        ..FieldDescriptorProto::default()
+/// The first field of every message that has a time.
+pub(super) fn time() -> Field {
+    typed("timestamp", 1, Type::Message, ".google.protobuf.Timestamp".into())
+}
+
+pub(super) fn message(name: &str, fields: Vec<Field>) -> Message {
+    Message { name: name.into(), fields, nested: Vec::new(), enums: Vec::new() }
+}
+
+impl Message {
+    /// Writes its descriptor. A field that can be absent takes, in this syntax, a choice with one member.
+    fn write(&self, buffer: &mut Vec<u8>, number: u32) {
+        nested(buffer, number, |buffer| {
+            text(buffer, 1, &self.name);
+            let mut choices = Vec::new();
+            for field in &self.fields {
+                nested(buffer, 2, |buffer| {
+                    text(buffer, 1, &field.name);
+                    whole(buffer, 3, field.number.into());
+                    whole(buffer, 4, if field.repeated { 3 } else { 1 });
+                    whole(buffer, 5, field.kind as u64);
+                    text(buffer, 6, &field.type_name);
+                    if field.optional {
+                        present_whole(buffer, 9, choices.len() as u64);
+                        whole(buffer, 17, 1);
+                        choices.push(format!("_{}", field.name));
+                    }
+                });
+            }
+            self.nested.iter().for_each(|message| message.write(buffer, 3));
+            for (name, values) in &self.enums {
+                nested(buffer, 4, |buffer| {
+                    text(buffer, 1, name);
+                    for (name, number) in values {
+                        nested(buffer, 2, |buffer| {
+                            text(buffer, 1, name);
+                            present_whole(buffer, 2, *number);
+                        });
+                    }
+                });
+            }
+            choices.iter().for_each(|name| nested(buffer, 8, |buffer| text(buffer, 1, name)));
+        });
     }
 }
 
-/// A message. A field that can be absent takes, in this syntax, a choice with one member; so can the `count` of a joint.
-pub(super) fn message(name: &str, mut fields: Vec<FieldDescriptorProto>) -> DescriptorProto {
-    let mut choices = Vec::new();
-    let is_count = |field: &FieldDescriptorProto| field.name() == "count" && name == "Joint";
-    for field in fields.iter_mut().filter(|field| field.proto3_optional() || is_count(field)) {
-        field.proto3_optional = Some(true);
-        field.oneof_index = Some(choices.len() as i32);
-        let name = Some(format!("_{}", field.name()));
-        choices.push(prost_types::OneofDescriptorProto { name, options: None });
-    }
-    DescriptorProto {
-        name: Some(name.into()),
-        field: fields,
-        oneof_decl: choices,
-        ..DescriptorProto::default()
-    }
+/// A set with one file of descriptors, whose path is made of a dotted name.
+fn file(name: &str, package: &str, dependency: &str, messages: &[Message]) -> Vec<u8> {
+    let mut set = Vec::new();
+    nested(&mut set, 1, |buffer| {
+        text(buffer, 1, &format!("{}.proto", name.replace('.', "/")));
+        text(buffer, 2, package);
+        text(buffer, 3, dependency);
+        messages.iter().for_each(|message| message.write(buffer, 4));
+        text(buffer, 12, "proto3");
+    });
+    set
 }
 
-fn enumeration(name: &str, values: impl Iterator<Item = (String, i32)>) -> EnumDescriptorProto {
-    EnumDescriptorProto {
-        name: Some(name.into()),
-        value: values
-            .map(|(name, number)| EnumValueDescriptorProto {
-                name: Some(name),
-                number: Some(number),
-                options: None,
-            })
-            .collect(),
-        ..EnumDescriptorProto::default()
-    }
-}
-
-pub(super) fn file(package: &str, messages: Vec<DescriptorProto>) -> FileDescriptorProto {
-    FileDescriptorProto {
-        name: Some(format!("{}.proto", package.replace('.', "/"))),
-        package: Some(package.into()),
-        message_type: messages,
-        syntax: Some("proto3".into()),
-        ..FileDescriptorProto::default()
-    }
+/// A set with the file of a schema that needs protobuf's own times, behind the file of these.
+pub(super) fn timed(schema: &str, messages: &[Message]) -> Vec<u8> {
+    let fields = vec![field("seconds", 1, Type::Int64), field("nanos", 2, Type::Int32)];
+    let times = file("google.protobuf.timestamp", "google.protobuf", "", &[message("Timestamp", fields)]);
+    let package = schema.split('.').next().unwrap_or_default();
+    [times, file(schema, package, "google/protobuf/timestamp.proto", messages)].concat()
 }
 
 /// `CountJump` to `COUNT_JUMP`.

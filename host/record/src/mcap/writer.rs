@@ -8,7 +8,7 @@ use super::about::{About, Setting};
 use super::decoder::{Arrival, Decoded, Track};
 use super::error::RecordingError;
 use super::file::WholeFile;
-use super::message::{Level, LinkStatus, Log, write_tick};
+use super::message::{Level, LinkStatus, write_event, write_tick};
 use super::{
     CHANNELS, Device, FORMAT, Kind, LIBRARY, PROFILE, SIGNALS, Stamp, metadata_name, schema, seal, twin,
 };
@@ -20,7 +20,6 @@ use blindgrasp_shared::fault::Raised;
 use blindgrasp_shared::link::most_bytes;
 use blindgrasp_shared::supervisor::Mode;
 use blindgrasp_shared::telemetry::INTERFACE_VERSION;
-use prost::Message;
 use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::fmt;
@@ -386,7 +385,7 @@ impl Writer {
             }
             _ => f64::NAN,
         };
-        self.write(device, Kind::Link, at, &status.encode_to_vec())?;
+        self.write(device, Kind::Link, at, &status.write())?;
         self.settle(at)?;
         Ok(status)
     }
@@ -486,13 +485,7 @@ impl Writer {
         name: &str,
         words: &str,
     ) -> Result<(), RecordingError> {
-        let timestamp = prost_types::Timestamp {
-            seconds: (at.0 / 1_000_000_000) as i64,
-            nanos: (at.0 % 1_000_000_000) as i32,
-        };
-        let log =
-            Log { timestamp: Some(timestamp), level: level.into(), message: words.into(), name: name.into() };
-        self.write(device, Kind::Event, at, &log.encode_to_vec())
+        self.write(device, Kind::Event, at, &write_event(at, level, name, words))
     }
 
     /// Adds metadata, with its checksum.

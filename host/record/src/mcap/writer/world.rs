@@ -5,13 +5,11 @@
 //! URDF calls `base` too.
 
 use super::Writer;
-use crate::mcap::message::{double, nested, present_double, text, whole};
-use crate::mcap::schema::{self, field, file, message, timestamp, typed};
+use crate::mcap::message::write_time;
+use crate::mcap::protobuf::{double, nested, present_double, text};
+use crate::mcap::schema::{Field, Message, Type, field, message, time, timed, typed};
 use crate::mcap::{Device, RecordingError, Stamp};
 use ::mcap::Attachment;
-use prost::Message as _;
-use prost_types::field_descriptor_proto::{Label, Type};
-use prost_types::{DescriptorProto, FieldDescriptorProto, FileDescriptorSet};
 use std::borrow::Cow;
 use std::collections::BTreeMap;
 
@@ -37,10 +35,7 @@ impl Truth {
 
     /// Writes the message of a tick.
     fn write(self, bytes: &mut Vec<u8>, at: Stamp, world: &World<'_>, joint_names: &[String]) {
-        nested(bytes, 1, |bytes| {
-            whole(bytes, 1, at.0 / 1_000_000_000);
-            whole(bytes, 2, at.0 % 1_000_000_000);
-        });
+        write_time(bytes, at);
         match self {
             Self::Object => {
                 text(bytes, 2, "base");
@@ -135,20 +130,14 @@ fn vector(bytes: &mut Vec<u8>, number: u32, values: &[f64]) {
 /// The descriptors of a schema, with all that it needs in one file.
 fn descriptors(schema: &str) -> Vec<u8> {
     let (package, name) = schema.split_once('.').unwrap_or_default();
-    let of = |name: &str| format!(".{package}.{name}");
-    let inner =
-        |field_name: &str, number, name: &str| typed(field(field_name, number, Type::Message), &of(name));
-    let several =
-        |field: FieldDescriptorProto| FieldDescriptorProto { label: Some(Label::Repeated.into()), ..field };
-    let doubles = |name: &str, components: &[&str]| -> DescriptorProto {
+    let inner = |name: &str, number, of: &str| typed(name, number, Type::Message, format!(".{package}.{of}"));
+    let several = |field| Field { repeated: true, ..field };
+    let doubles = |name: &str, components: &[&str]| -> Message {
         let fields = components.iter().zip(1..).map(|(name, number)| field(name, number, Type::Double));
         message(name, fields.collect())
     };
-    let optional = |name: &str, number| FieldDescriptorProto {
-        proto3_optional: Some(true),
-        ..field(name, number, Type::Double)
-    };
-    let time = typed(field("timestamp", 1, Type::Message), ".google.protobuf.Timestamp");
+    let optional = |name: &str, number| Field { optional: true, ..field(name, number, Type::Double) };
+    let time = time();
     let vector3 = |name: &str| doubles(name, &["x", "y", "z"]);
     let messages = match name {
         "FrameTransform" => vec![
@@ -184,10 +173,5 @@ fn descriptors(schema: &str) -> Vec<u8> {
             message(name, vec![time, several(inner("contacts", 2, "Contact"))]),
         ],
     };
-    let file = prost_types::FileDescriptorProto {
-        name: Some(format!("{}.proto", schema.replace('.', "/"))),
-        dependency: vec![schema::TIMESTAMP.into()],
-        ..file(package, messages)
-    };
-    FileDescriptorSet { file: vec![timestamp(), file] }.encode_to_vec()
+    timed(schema, &messages)
 }
