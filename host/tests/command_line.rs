@@ -1,57 +1,17 @@
 //! `blindgrasp sim` as a user meets it: what it prints, what it writes, and what it says to bad input.
 
+use crate::folder::{Folder, text};
 use serde_json::Value;
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::{Command, Output};
 
 fn blindgrasp(arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_blindgrasp")).args(arguments).output().expect("the command starts")
+    Folder::new().run(arguments)
 }
 
-fn text(bytes: &[u8]) -> String {
-    String::from_utf8(bytes.to_vec()).expect("UTF-8")
-}
-
-/// A directory that goes with the test.
-struct Folder(PathBuf);
-
-impl Folder {
-    fn new(name: &str) -> Self {
-        let path = std::env::temp_dir().join(format!("blindgrasp-{}-{name}", std::process::id()));
-        let _ = fs::remove_dir_all(&path);
-        fs::create_dir_all(&path).expect("a directory");
-        Self(path)
-    }
-
-    fn write(&self, name: &str, text: &str) -> String {
-        let path = self.0.join(name);
-        fs::write(&path, text).expect("a file");
-        path.to_str().expect("UTF-8").to_owned()
-    }
-
-    fn path(&self, name: &str) -> String {
-        self.0.join(name).to_str().expect("UTF-8").to_owned()
-    }
-}
-
-impl Drop for Folder {
-    fn drop(&mut self) {
-        let _ = fs::remove_dir_all(&self.0);
-    }
-}
-
-/// Exit code 2, nothing on stdout, and one line on stderr with all of these words in it.
 fn assert_refused(arguments: &[&str], words: &[&str]) {
-    let output = blindgrasp(arguments);
-    let error = text(&output.stderr);
-    assert_eq!(output.status.code(), Some(2), "{arguments:?}: {error}");
-    assert!(output.stdout.is_empty(), "{arguments:?}");
-    let lines: Vec<&str> = error.lines().filter(|line| !line.contains("warning")).collect();
-    assert_eq!(lines.len(), 1, "{arguments:?}: {error}");
-    for word in words {
-        assert!(lines[0].contains(word), "{arguments:?}: no `{word}` in: {error}");
-    }
+    Folder::new().refused(arguments, words);
 }
 
 #[test]
@@ -127,7 +87,7 @@ fn a_fault_of_the_controller_is_named() {
 
 #[test]
 fn out_writes_every_file_and_the_scene_reproduces_the_run() {
-    let folder = Folder::new("out");
+    let folder = Folder::new();
     let (first, second) = (folder.path("first"), folder.path("second"));
     let changed = ["--set", "control.force_n=4.5", "--duration", "0.3", "--set", "sensors.noise_counts=0.3"];
     let output = blindgrasp(&[&["sim", "cube", "--out", &first], &changed[..]].concat());
@@ -179,19 +139,19 @@ fn out_writes_every_file_and_the_scene_reproduces_the_run() {
 
 #[test]
 fn another_run_is_overwritten_only_by_force() {
-    let folder = Folder::new("force");
+    let folder = Folder::new();
     folder.write("notes.txt", "mine");
     let out = folder.path("");
     assert_refused(&["sim", "prism", "--duration", "0.01", "--out", &out], &["not empty", "--force"]);
     let output = blindgrasp(&["sim", "prism", "--duration", "0.01", "--out", &out, "--force"]);
     assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
-    assert!(folder.0.join("summary.json").exists());
-    assert_eq!(fs::read_to_string(folder.0.join("notes.txt")).expect("a file"), "mine", "other files stay");
+    assert!(Path::new(&folder.path("summary.json")).exists());
+    assert_eq!(folder.read("notes.txt"), "mine", "other files stay");
 }
 
 #[test]
 fn what_can_not_be_written_is_said_after_the_summary() {
-    let folder = Folder::new("blocked");
+    let folder = Folder::new();
     // A file where a directory has to be: this stops root too.
     let blocked = folder.write("file", "") + "/run";
     let output = blindgrasp(&["sim", "prism", "--duration", "0.01", "--json", "--out", &blocked]);
@@ -205,8 +165,7 @@ fn what_can_not_be_written_is_said_after_the_summary() {
 #[cfg(unix)]
 #[test]
 fn a_full_disk_is_said_after_the_summary_and_what_was_there_stays() {
-    let folder = Folder::new("full");
-    fs::create_dir(folder.path("run")).expect("a directory");
+    let folder = Folder::new();
     folder.write("run/trace.csv", "an old one");
     // No file may be longer than 4 KiB; a write beyond that is an error, and no signal.
     let output = Command::new("sh")
@@ -218,7 +177,7 @@ fn a_full_disk_is_said_after_the_summary_and_what_was_there_stays() {
     assert!(text(&output.stdout).contains("prism"), "the summary is printed all the same");
     let error = text(&output.stderr);
     assert!(error.contains("File too large") && error.contains("nothing is written"), "{error}");
-    assert_eq!(fs::read_to_string(folder.path("run/trace.csv")).expect("a file"), "an old one");
+    assert_eq!(folder.read("run/trace.csv"), "an old one");
     assert_eq!(fs::read_dir(folder.path("")).expect("a folder").count(), 1);
 }
 
@@ -226,7 +185,7 @@ fn a_full_disk_is_said_after_the_summary_and_what_was_there_stays() {
 #[cfg(target_os = "linux")]
 #[test]
 fn a_device_in_a_folder_is_not_replaced() {
-    let folder = Folder::new("device");
+    let folder = Folder::new();
     fs::create_dir(folder.path("run")).expect("a directory");
     std::os::unix::fs::symlink("/dev/null", folder.path("run/trace.csv")).expect("a link");
     let output = blindgrasp(&["sim", "prism", "--duration", "0.05", "--force", "--out", &folder.path("run")]);
@@ -267,15 +226,15 @@ fn settings_that_are_none_are_refused() {
 
 /// The shipped scene in one file, to be damaged.
 fn whole_scene() -> String {
-    let folder = Folder::new("whole");
+    let folder = Folder::new();
     let out = folder.path("run");
     assert_eq!(blindgrasp(&["sim", "cube", "--duration", "0.01", "--out", &out]).status.code(), Some(0));
-    fs::read_to_string(folder.0.join("run/scene.toml")).expect("the effective scene")
+    folder.read("run/scene.toml")
 }
 
 #[test]
 fn bad_scene_files_are_refused_with_file_key_and_remedy() {
-    let folder = Folder::new("bad");
+    let folder = Folder::new();
     let whole = whole_scene();
     let cases: &[(&str, &str, &str, &[&str])] = &[
         ("broken TOML", "[control]", "[control", &["bad.toml:"]),
@@ -315,8 +274,7 @@ fn bad_scene_files_are_refused_with_file_key_and_remedy() {
     let path = folder.write("bad.toml", &fingerless);
     assert_refused(&["sim", &path], &["bad.toml", "fingertip"]);
     // Not text at all.
-    let path = folder.path("bad.toml");
-    fs::write(&path, [0xff, 0xfe, 0x00, 0x80]).expect("a file");
+    let path = folder.write("bad.toml", [0xff, 0xfe, 0x00, 0x80]);
     assert_refused(&["sim", &path], &["bad.toml"]);
     assert_refused(&["sim", &folder.path("missing.toml")], &["missing.toml"]);
 }
@@ -337,7 +295,7 @@ fn impossible_inertias_warn_or_are_refused() {
 /// From a mesh to an object in a scene, as a new user does it.
 #[test]
 fn objects_are_checked_and_made_from_meshes() {
-    let folder = Folder::new("object");
+    let folder = Folder::new();
     // A tetrahedron in millimetres, whose last triangle shows its inside.
     let corners = [[0, 0, 0], [40, 0, 0], [0, 40, 0], [0, 0, 40]];
     let mut mesh = "solid\n".to_owned();

@@ -3,58 +3,21 @@
 #[cfg(feature = "probe")]
 use crate::elf;
 
-#[cfg(feature = "probe")]
-use std::fs;
-use std::process::{Command, Output};
-use tempfile::TempDir;
-
-/// A directory that goes with the test.
-struct Folder(TempDir);
-
-impl Folder {
-    fn new() -> Self {
-        Self(tempfile::tempdir().expect("a directory"))
-    }
-
-    #[cfg(feature = "probe")]
-    fn write(&self, name: &str, bytes: &[u8]) -> String {
-        let path = self.0.path().join(name);
-        fs::create_dir_all(path.parent().expect("a parent")).expect("a directory");
-        fs::write(&path, bytes).expect("a file");
-        path.to_str().expect("UTF-8").to_owned()
-    }
-}
-
-fn blindgrasp(folder: &Folder, arguments: &[&str]) -> Output {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_blindgrasp"));
-    command.env("CARGO_TARGET_DIR", folder.0.path()).args(arguments).output().expect("the command starts")
-}
-
-/// Exit code 2, nothing on stdout, and one line on stderr with all of these words in it.
-fn assert_refused(folder: &Folder, arguments: &[&str], words: &[&str]) {
-    let output = blindgrasp(folder, arguments);
-    let error = String::from_utf8(output.stderr).expect("UTF-8");
-    assert_eq!(output.status.code(), Some(2), "{arguments:?}: {error}");
-    assert!(output.stdout.is_empty(), "{arguments:?}");
-    assert_eq!(error.lines().count(), 1, "{arguments:?}: {error}");
-    for word in words {
-        assert!(error.contains(word), "{arguments:?}: no `{word}` in: {error}");
-    }
-}
+use crate::folder::Folder;
 
 #[cfg(not(feature = "probe"))]
 #[test]
 fn a_build_without_probes_says_how_to_get_one_with_them() {
     let folder = Folder::new();
     for arguments in [&["flash"][..], &["flash", "image", "--dry-run", "--json", "--verify"]] {
-        assert_refused(&folder, arguments, &["cargo run --release --features probe -- flash"]);
+        folder.refused(arguments, &["cargo run --release --features probe -- flash"]);
     }
 }
 
 #[cfg(feature = "probe")]
 mod with_probes {
+    use super::Folder;
     use super::elf::{Elf, FLASH, RAM, RAM_END, Segment, image};
-    use super::{Folder, assert_refused, blindgrasp};
     use blindgrasp::device::flash::Chip;
     use blindgrasp::device::flash::logs::{Line, Logs};
     use blindgrasp::device::flash::probe::{choose, contradiction};
@@ -72,7 +35,7 @@ mod with_probes {
 
     /// The chip that is meant where nothing else is said, by the command's help.
     fn default_chip() -> String {
-        let help = blindgrasp(&Folder::new(), &["flash", "--help"]).stdout;
+        let help = Folder::new().run(&["flash", "--help"]).stdout;
         let help = String::from_utf8(help).expect("UTF-8");
         let (_, chip) = help.split_once("--chip <NAME>").expect("the option");
         let (_, default) = chip.split_once("[default: ").expect("its default");
@@ -83,7 +46,7 @@ mod with_probes {
     fn a_dry_run_tells_what_the_image_is_and_takes() {
         let folder = Folder::new();
         let path = folder.write("hand", &Elf::good(&image()).bytes());
-        let output = blindgrasp(&folder, &["flash", &path, "--dry-run", "--json"]);
+        let output = folder.run(&["flash", &path, "--dry-run", "--json"]);
         assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
         assert!(output.stderr.is_empty());
         let report: Value = serde_json::from_slice(&output.stdout).expect("one JSON object");
@@ -110,7 +73,7 @@ mod with_probes {
         });
         assert_eq!(report, expected);
 
-        let output = blindgrasp(&folder, &["flash", &path, "--dry-run"]);
+        let output = folder.run(&["flash", &path, "--dry-run"]);
         let table = String::from_utf8(output.stdout).expect("UTF-8");
         for words in [
             "three-finger (01234567",
@@ -127,13 +90,12 @@ mod with_probes {
     #[test]
     fn the_image_that_was_built_last_is_the_default() {
         let folder = Folder::new();
-        assert_refused(
-            &folder,
+        folder.refused(
             &["flash", "--dry-run"],
             &["no image", "thumbv7em-none-eabihf/firmware/hand", "tests/firmware-toolchain cargo build"],
         );
         let path = folder.write("debian/thumbv7em-none-eabihf/firmware/hand", &Elf::good(&image()).bytes());
-        let output = blindgrasp(&folder, &["flash", "--dry-run", "--json"]);
+        let output = folder.run(&["flash", "--dry-run", "--json"]);
         let report: Value = serde_json::from_slice(&output.stdout).expect("one JSON object");
         assert_eq!(report["image"], Value::from(path));
     }
@@ -144,7 +106,7 @@ mod with_probes {
         let refuse = |bytes: &[u8], words: &[&str]| {
             let path = folder.write("image", bytes);
             for more in [&["--dry-run"][..], &["--probe", NO_PROBE]] {
-                assert_refused(&folder, &[&["flash", &path], more].concat(), words);
+                folder.refused(&[&["flash", &path], more].concat(), words);
             }
         };
         let good = Elf::good(&image());
@@ -192,24 +154,17 @@ mod with_probes {
     fn files_and_chips_that_are_not_there_are_named() {
         let folder = Folder::new();
         let path = folder.write("image", &Elf::good(&image()).bytes());
-        assert_refused(
-            &folder,
-            &["flash", "nowhere/hand", "--dry-run"],
-            &["cannot read the image nowhere/hand"],
-        );
-        assert_refused(&folder, &["flash", "/", "--dry-run"], &["cannot read the image /: it is a folder"]);
+        folder.refused(&["flash", "nowhere/hand", "--dry-run"], &["cannot read the image nowhere/hand"]);
+        folder.refused(&["flash", "/", "--dry-run"], &["cannot read the image /: it is a folder"]);
         let default = default_chip();
         // Without its package, and then without its flash.
         let family = default.strip_suffix("Tx").expect("a package");
         let misspelt = format!("{}X", &family[..family.len() - 1]);
         let chip = |name| ["flash", path.as_str(), "--dry-run", "--chip", name];
-        assert_refused(
-            &folder,
-            &chip(&misspelt),
-            &[&format!("no chip is called `{misspelt}`; did you mean {family}?")],
-        );
-        assert_refused(&folder, &chip("abacus"), &["no chip is called `abacus`", "https://probe.rs/targets"]);
-        assert_refused(&folder, &chip("GD32VF103CB"), &["no Arm core"]);
+        folder
+            .refused(&chip(&misspelt), &[&format!("no chip is called `{misspelt}`; did you mean {family}?")]);
+        folder.refused(&chip("abacus"), &["no chip is called `abacus`", "https://probe.rs/targets"]);
+        folder.refused(&chip("GD32VF103CB"), &["no Arm core"]);
     }
 
     #[test]
@@ -218,11 +173,10 @@ mod with_probes {
         let folder = Folder::new();
         let path = folder.write("image", &Elf::good(&image()).bytes());
         let small = ["flash", path.as_str(), "--dry-run", "--chip", "STM32F401RBTx"];
-        assert_refused(&folder, &small, &["stack pointer 0x20020000", "--chip"]);
+        folder.refused(&small, &["stack pointer 0x20020000", "--chip"]);
         let path = folder.write("small", &Elf::good(&image()).with_word(0, RAM + 0x1_0000).bytes());
         let small = ["flash", path.as_str(), "--dry-run", "--json", "--chip", "STM32F401RBTx"];
-        let report: Value =
-            serde_json::from_slice(&blindgrasp(&folder, &small).stdout).expect("one JSON object");
+        let report: Value = serde_json::from_slice(&folder.run(&small).stdout).expect("one JSON object");
         assert_eq!(report["flash"]["available_bytes"], 128 * 1024);
         assert_eq!(report["ram"]["available_bytes"], 64 * 1024);
     }
@@ -233,12 +187,12 @@ mod with_probes {
         let path = folder.write("image", &Elf::good(&Image { hand: "another", ..image() }).bytes());
         let model = concat!(env!("CARGO_MANIFEST_DIR"), "/../models/hands/three-finger.toml");
         let arguments = ["flash", path.as_str(), "--dry-run", "--hand", model];
-        assert_refused(&folder, &arguments, &["for the hand `another`, not for `three-finger`"]);
+        folder.refused(&arguments, &["for the hand `another`, not for `three-finger`"]);
         let path = folder.write("image", &Elf::good(&image()).bytes());
         let arguments = ["flash", path.as_str(), "--dry-run", "--hand", model];
-        assert_refused(&folder, &arguments, &["hash 01234567", "build the image again"]);
+        folder.refused(&arguments, &["hash 01234567", "build the image again"]);
         let arguments = ["flash", path.as_str(), "--dry-run", "--hand", "nowhere.toml"];
-        assert_refused(&folder, &arguments, &["nowhere.toml"]);
+        folder.refused(&arguments, &["nowhere.toml"]);
     }
 
     #[test]
@@ -246,20 +200,20 @@ mod with_probes {
         let folder = Folder::new();
         let path = folder.write("image", &Elf::good(&image()).bytes());
         // Which of the two depends on what is connected to this machine.
-        assert_refused(&folder, &["flash", &path, "--probe", NO_PROBE], &["no debug probe"]);
+        folder.refused(&["flash", &path, "--probe", NO_PROBE], &["no debug probe"]);
         let arguments = ["flash", &path, "--brown-out", "3", "--probe", NO_PROBE];
-        assert_refused(&folder, &arguments, &["no debug probe"]);
+        folder.refused(&arguments, &["no debug probe"]);
     }
 
     #[test]
     fn monitoring_needs_logs_in_the_image() {
         let folder = Folder::new();
         let path = folder.write("image", &Elf::good(&image()).bytes());
-        assert_refused(&folder, &["flash", &path, "--monitor", "--probe", NO_PROBE], &["no defmt logs"]);
+        folder.refused(&["flash", &path, "--monitor", "--probe", NO_PROBE], &["no defmt logs"]);
         let mut elf = with_logs("rzcobs");
         elf.symbols.remove(0);
         let path = folder.write("image", &elf.bytes());
-        assert_refused(&folder, &["flash", &path, "--monitor", "--probe", NO_PROBE], &["_SEGGER_RTT"]);
+        folder.refused(&["flash", &path, "--monitor", "--probe", NO_PROBE], &["_SEGGER_RTT"]);
     }
 
     #[test]

@@ -1,72 +1,16 @@
 //! `blindgrasp hand` as a user meets it: a URDF, a hand's file for it, and back.
 
+use crate::folder::Folder;
 use std::fs;
-use std::path::PathBuf;
-use std::process::{Command, Output};
-
-/// Runs the command in a folder.
-fn blindgrasp(folder: &Folder, arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_blindgrasp"))
-        .args(arguments)
-        .current_dir(&folder.0)
-        .output()
-        .expect("the command starts")
-}
-
-fn text(bytes: &[u8]) -> String {
-    String::from_utf8(bytes.to_vec()).expect("UTF-8")
-}
-
-/// A directory that goes with the test.
-struct Folder(PathBuf);
-
-impl Folder {
-    fn new(name: &str) -> Self {
-        let path = std::env::temp_dir().join(format!("blindgrasp-{}-{name}", std::process::id()));
-        let _ = fs::remove_dir_all(&path);
-        fs::create_dir_all(path.join("parts")).expect("a directory");
-        Self(path)
-    }
-
-    fn read(&self, name: &str) -> String {
-        fs::read_to_string(self.0.join(name)).expect("a file")
-    }
-
-    fn write(&self, name: &str, text: &str) {
-        fs::write(self.0.join(name), text).expect("a file");
-    }
-
-    /// Returns the output of the command; it has to succeed.
-    fn run(&self, arguments: &[&str]) -> (String, String) {
-        let output = blindgrasp(self, arguments);
-        let (out, err) = (text(&output.stdout), text(&output.stderr));
-        assert_eq!(output.status.code(), Some(0), "{arguments:?}: {err}");
-        (out, err)
-    }
-
-    /// The one line that the command says, with exit code 2.
-    fn refused(&self, arguments: &[&str]) -> String {
-        let output = blindgrasp(self, arguments);
-        let error = text(&output.stderr);
-        assert_eq!(output.status.code(), Some(2), "{arguments:?}: {error}");
-        assert!(output.stdout.is_empty(), "{arguments:?}");
-        error.trim_end().to_owned()
-    }
-}
-
-impl Drop for Folder {
-    fn drop(&mut self) {
-        let _ = fs::remove_dir_all(&self.0);
-    }
-}
+use std::path::Path;
 
 /// From a hand to a URDF, to a hand's file with guessed gains, to a grasp that settles.
 #[test]
 fn a_urdf_becomes_a_hand_that_grasps() {
-    let folder = Folder::new("hand-grasps");
-    let (_, said) = folder.run(&["hand", "export", "three-finger", "--urdf", "--out", "my.urdf"]);
+    let folder = Folder::new();
+    let (_, said) = folder.done(&["hand", "export", "three-finger", "--urdf", "--out", "my.urdf"]);
     assert_eq!(said, "blindgrasp: wrote my.urdf\n");
-    let (out, said) = folder.run(&["hand", "new", "my.urdf"]);
+    let (out, said) = folder.done(&["hand", "new", "my.urdf"]);
     assert!(out.is_empty());
     assert!(said.ends_with("blindgrasp: wrote my.toml\n"), "{said}");
     assert_eq!(said.lines().filter(|line| line.starts_with("blindgrasp: guessed: ")).count(), 4, "{said}");
@@ -75,66 +19,65 @@ fn a_urdf_becomes_a_hand_that_grasps() {
         let settings = ["hand=./my.toml", "control.force_n=5", "control.attitude_stiffness_nm=5e-3"];
         let mut arguments = vec!["sim", scene, "--json"];
         arguments.extend(settings.iter().flat_map(|setting| ["--set", *setting]));
-        let (out, said) = folder.run(&arguments);
+        let (out, said) = folder.done(&arguments);
         assert_eq!(said, "");
         assert!(out.contains("\"settled\":true") && out.contains("\"grasp_held\":true"), "{out}");
     }
     // The effective scene needs neither file.
-    folder.run(&["sim", "cube", "--set", "hand=./my.toml", "--out", "run"]);
-    fs::remove_file(folder.0.join("my.urdf")).expect("a file");
-    folder.run(&["sim", "run/scene.toml", "--duration", "0.1"]);
+    folder.done(&["sim", "cube", "--set", "hand=./my.toml", "--out", "run"]);
+    fs::remove_file(folder.path("my.urdf")).expect("a file");
+    folder.done(&["sim", "run/scene.toml", "--duration", "0.1"]);
 }
 
 /// The same text on stdout and in a file; the file of a hand in another folder names the URDF from there.
 #[test]
 fn files_name_each_other_wherever_they_are() {
-    let folder = Folder::new("hand-paths");
-    let (out, said) = folder.run(&["hand", "export", "two-finger", "--urdf"]);
+    let folder = Folder::new();
+    ["parts", "hands"].map(|name| fs::create_dir(folder.path(name)).expect("a folder"));
+    let (out, said) = folder.done(&["hand", "export", "two-finger", "--urdf"]);
     assert_eq!(said, "");
-    folder.run(&["hand", "export", "two-finger", "--urdf", "--out", "parts/two.urdf"]);
+    folder.done(&["hand", "export", "two-finger", "--urdf", "--out", "parts/two.urdf"]);
     assert_eq!(out, folder.read("parts/two.urdf"));
     for (toml, file) in [("two.toml", "parts/two.urdf"), ("parts/two.toml", "two.urdf")] {
-        folder.run(&["hand", "new", "parts/two.urdf", "--out", toml]);
+        folder.done(&["hand", "new", "parts/two.urdf", "--out", toml]);
         assert!(folder.read(toml).contains(&format!("file = \"{file}\"\n")), "{}", folder.read(toml));
-        folder.run(&["hand", "export", &format!("./{toml}"), "--urdf"]);
+        folder.done(&["hand", "export", &format!("./{toml}"), "--urdf"]);
     }
-    fs::create_dir_all(folder.0.join("hands")).expect("a directory");
-    folder.run(&["hand", "new", "./parts/two.urdf", "--out", "hands/two.toml"]);
+    folder.done(&["hand", "new", "./parts/two.urdf", "--out", "hands/two.toml"]);
     assert!(folder.read("hands/two.toml").contains("file = \"../parts/two.urdf\"\n"));
-    folder.run(&["hand", "export", "hands/two.toml", "--urdf"]);
-    let absolute = folder.0.join("parts/two.urdf");
-    let absolute = absolute.to_str().expect("UTF-8");
-    folder.run(&["hand", "new", absolute, "--out", "hands/absolute.toml"]);
+    folder.done(&["hand", "export", "hands/two.toml", "--urdf"]);
+    let absolute = &folder.path("parts/two.urdf");
+    folder.done(&["hand", "new", absolute, "--out", "hands/absolute.toml"]);
     assert!(folder.read("hands/absolute.toml").contains(&format!("file = \"{absolute}\"\n")));
-    folder.run(&["hand", "export", "hands/absolute.toml", "--urdf"]);
+    folder.done(&["hand", "export", "hands/absolute.toml", "--urdf"]);
     // Beside it, where it can move with it.
-    folder.run(&["hand", "new", absolute, "--force"]);
+    folder.done(&["hand", "new", absolute, "--force"]);
     assert!(folder.read("parts/two.toml").contains("file = \"two.urdf\"\n"));
 }
 
 #[test]
 fn nothing_is_overwritten_unasked() {
-    let folder = Folder::new("hand-overwrite");
-    folder.run(&["hand", "export", "two-finger", "--urdf", "--out", "a.urdf"]);
+    let folder = Folder::new();
+    folder.done(&["hand", "export", "two-finger", "--urdf", "--out", "a.urdf"]);
     folder.write("a.toml", "mine");
     let expected =
         "blindgrasp: a.toml: is there already; choose another with --out, or overwrite it with --force";
-    assert_eq!(folder.refused(&["hand", "new", "a.urdf"]), expected);
+    assert_eq!(folder.refused(&["hand", "new", "a.urdf"], &[]), expected);
     assert_eq!(folder.read("a.toml"), "mine");
-    let again = folder.refused(&["hand", "export", "two-finger", "--urdf", "--out", "a.urdf"]);
+    let again = folder.refused(&["hand", "export", "two-finger", "--urdf", "--out", "a.urdf"], &[]);
     assert_eq!(again, expected.replace("a.toml", "a.urdf"));
-    folder.run(&["hand", "new", "a.urdf", "--force"]);
-    folder.run(&["hand", "export", "two-finger", "--urdf", "--out", "a.urdf", "--force"]);
+    folder.done(&["hand", "new", "a.urdf", "--force"]);
+    folder.done(&["hand", "export", "two-finger", "--urdf", "--out", "a.urdf", "--force"]);
     // What can't be used is not written.
     folder.write("b.urdf", "<robot name=\"b\"><link name=\"a\"/></robot>");
-    folder.refused(&["hand", "new", "b.urdf"]);
-    assert!(!folder.0.join("b.toml").exists());
+    folder.refused(&["hand", "new", "b.urdf"], &[]);
+    assert!(!Path::new(&folder.path("b.toml")).exists());
 }
 
 #[test]
 fn mistakes_are_one_line() {
-    let folder = Folder::new("hand-mistakes");
-    folder.run(&["hand", "export", "two-finger", "--urdf", "--out", "a.urdf"]);
+    let folder = Folder::new();
+    folder.done(&["hand", "export", "two-finger", "--urdf", "--out", "a.urdf"]);
     let cases: [(&[&str], &str); 9] = [
         (&["hand", "new", "none.urdf"], "blindgrasp: none.urdf: no such file; check the path"),
         (
@@ -165,7 +108,7 @@ fn mistakes_are_one_line() {
         (&["hand", "new", "a.urdf", "--fingertip", "a:1,2"], "`1,2` is not x,y,z: three numbers, m"),
     ];
     for (arguments, expected) in cases {
-        let error = folder.refused(arguments);
+        let error = folder.refused(arguments, &[]);
         if expected.starts_with("blindgrasp: ") {
             assert_eq!(error, expected, "{arguments:?}");
         } else {

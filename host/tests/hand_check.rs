@@ -1,35 +1,19 @@
 //! `blindgrasp hand check` as a user meets it: exit codes, streams, JSON, and the picture.
 
+use crate::folder::{Folder, text};
 use serde_json::Value;
-use std::fs;
-use std::path::PathBuf;
-use std::process::{Command, Output};
+use std::path::Path;
+use std::process::Output;
 
 fn check(arguments: &[&str]) -> Output {
-    let command =
-        Command::new(env!("CARGO_BIN_EXE_blindgrasp")).args(["hand", "check"]).args(arguments).output();
-    command.expect("the command starts")
+    Folder::new().run(&[&["hand", "check"], arguments].concat())
 }
 
-fn text(bytes: &[u8]) -> String {
-    String::from_utf8(bytes.to_vec()).expect("UTF-8")
-}
-
-/// A path in a directory of its own.
-fn path(name: &str) -> PathBuf {
-    let folder = std::env::temp_dir().join(format!("blindgrasp-hand-check-{}", std::process::id()));
-    fs::create_dir_all(&folder).expect("a directory");
-    folder.join(name)
-}
-
-/// A file with the three-fingered hand, changed.
-fn hand(name: &str, from: &str, to: &str) -> String {
-    let shipped = concat!(env!("CARGO_MANIFEST_DIR"), "/../models/hands/three-finger.toml");
-    let text = fs::read_to_string(shipped).expect("a hand");
+/// Writes a file with the three-fingered hand, changed.
+fn hand(folder: &Folder, from: &str, to: &str) -> String {
+    let text = include_str!("../../models/hands/three-finger.toml");
     assert!(text.contains(from), "{from}");
-    let path = path(name);
-    fs::write(&path, text.replacen(from, to, 1)).expect("a file");
-    path.to_str().expect("UTF-8").to_owned()
+    folder.write("hand.toml", text.replacen(from, to, 1))
 }
 
 #[test]
@@ -47,14 +31,15 @@ fn a_good_hand_has_exit_code_0() {
 
 #[test]
 fn warnings_are_told_and_allowed_errors_are_not() {
-    let flipped = hand("flipped.toml", "axis = [0.0, 1.0, 0.0]", "axis = [0.0, -1.0, 0.0]");
+    let folder = Folder::new();
+    let flipped = hand(&folder, "axis = [0.0, 1.0, 0.0]", "axis = [0.0, -1.0, 0.0]");
     let output = check(&[&flipped]);
     assert_eq!(output.status.code(), Some(0));
     assert!(
         text(&output.stdout).contains("antiparallel")
             && text(&output.stdout).ends_with("doubtful: 1 warning\n")
     );
-    let broken = hand("long.toml", "0.064]", "64.0]");
+    let broken = hand(&folder, "0.064]", "64.0]");
     let output = check(&["--json", &broken]);
     assert_eq!(output.status.code(), Some(1));
     let check: Value = serde_json::from_slice(&output.stdout).expect("one JSON object");
@@ -66,7 +51,8 @@ fn warnings_are_told_and_allowed_errors_are_not() {
 
 #[test]
 fn what_can_not_be_read_has_exit_code_2_and_one_line() {
-    let unread = hand("unread.toml", "schema = 1", "schema = one");
+    let folder = Folder::new();
+    let unread = hand(&folder, "schema = 1", "schema = one");
     for arguments in
         [&[unread.as_str()][..], &["no-such-hand"], &["nowhere/hand.toml"], &["nowhere/hand.urdf"]]
     {
@@ -80,20 +66,19 @@ fn what_can_not_be_read_has_exit_code_2_and_one_line() {
 
 #[test]
 fn the_picture_is_written() {
-    let picture = path("hand.svg");
-    let to = picture.to_str().expect("UTF-8");
-    let output = check(&["two-finger", "--picture", to]);
+    let folder = Folder::new();
+    let output = check(&["two-finger", "--picture", &folder.path("hand.svg")]);
     assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
-    let svg = fs::read_to_string(&picture).expect("a picture");
+    let svg = folder.read("hand.svg");
     assert!(svg.starts_with("<svg ") && svg.contains("finger-2-flex-3") && !svg.contains("NaN"));
     // A picture that can't be written is bad usage; what was found is told all the same.
     let output = check(&["two-finger", "--picture", "/nowhere/hand.svg"]);
     assert_eq!(output.status.code(), Some(2));
     assert!(text(&output.stdout).contains("good: nothing found"));
     // Nothing to draw: told, and no file.
-    let unknown = hand("unknown.toml", "parent = \"finger-1-flex-1\"", "parent = \"wrist\"");
-    let picture = path("unknown.svg");
-    let output = check(&[&unknown, "--picture", picture.to_str().expect("UTF-8")]);
+    let unknown = hand(&folder, "parent = \"finger-1-flex-1\"", "parent = \"wrist\"");
+    let picture = folder.path("unknown.svg");
+    let output = check(&[&unknown, "--picture", &picture]);
     assert_eq!(output.status.code(), Some(1));
-    assert!(text(&output.stderr).contains("no picture") && !picture.exists());
+    assert!(text(&output.stderr).contains("no picture") && !Path::new(&picture).exists());
 }

@@ -1,7 +1,6 @@
 //! The command as its users meet it, and the host's crates put together.
 
 #[cfg(feature = "monitor")]
-#[cfg(feature = "monitor")]
 mod any_device;
 mod broken;
 mod command_line;
@@ -12,6 +11,7 @@ mod export;
 #[cfg(all(unix, feature = "parquet", feature = "sweep"))]
 mod files;
 mod flash;
+mod folder;
 mod hand;
 mod hand_check;
 mod image;

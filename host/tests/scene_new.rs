@@ -1,48 +1,16 @@
 //! `blindgrasp scene new` as a user meets it: what it prints and writes, and what it says where there is no placement.
 
+use crate::folder::{Folder, text};
 use serde_json::Value;
 use std::fs;
-use std::path::PathBuf;
-use std::process::{Command, Output};
+use std::process::Output;
 
-/// A directory that goes with the test, and the command run in it.
-struct Folder(PathBuf);
-
-impl Folder {
-    fn new(name: &str) -> Self {
-        let path = std::env::temp_dir().join(format!("blindgrasp-scene-new-{}-{name}", std::process::id()));
-        let _ = fs::remove_dir_all(&path);
-        fs::create_dir_all(&path).expect("a directory");
-        Self(path)
-    }
-
-    fn run(&self, arguments: &[&str]) -> Output {
-        let mut command = Command::new(env!("CARGO_BIN_EXE_blindgrasp"));
-        command.args(arguments).current_dir(&self.0).output().expect("the command starts")
-    }
-
-    fn new_scene(&self, arguments: &[&str]) -> Output {
-        self.run(&[&["scene", "new"], arguments].concat())
-    }
-
-    /// Exit code 2, nothing on stdout, and these words on stderr.
-    fn refused(&self, arguments: &[&str], words: &str) {
-        let output = self.new_scene(arguments);
-        let error = text(&output.stderr);
-        assert_eq!(output.status.code(), Some(2), "{arguments:?}: {error}");
-        assert!(output.stdout.is_empty() && error.lines().count() == 1, "{arguments:?}: {error}");
-        assert!(error.contains(words), "{arguments:?}: no `{words}` in {error}");
-    }
+fn new_scene(folder: &Folder, arguments: &[&str]) -> Output {
+    folder.run(&[&["scene", "new"], arguments].concat())
 }
 
-impl Drop for Folder {
-    fn drop(&mut self) {
-        let _ = fs::remove_dir_all(&self.0);
-    }
-}
-
-fn text(bytes: &[u8]) -> String {
-    String::from_utf8(bytes.to_vec()).expect("UTF-8")
+fn refused(folder: &Folder, arguments: &[&str], words: &str) {
+    folder.refused(&[&["scene", "new"], arguments].concat(), &[words]);
 }
 
 fn json(output: &Output) -> Value {
@@ -51,8 +19,8 @@ fn json(output: &Output) -> Value {
 
 #[test]
 fn what_is_written_is_what_is_printed_and_what_sim_runs() {
-    let folder = Folder::new("written");
-    let output = folder.new_scene(&["three-finger", "cube", "--ideal", "--json", "--list", "3"]);
+    let folder = Folder::new();
+    let output = new_scene(&folder, &["three-finger", "cube", "--ideal", "--json", "--list", "3"]);
     assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
     let printed = json(&output);
     assert_eq!(
@@ -66,7 +34,7 @@ fn what_is_written_is_what_is_printed_and_what_sim_runs() {
     // The effective scene of a run has the joint angles that were printed, in its first row.
     let run = folder.run(&["sim", "three-finger-cube-ideal.toml", "--duration", "0.01", "--out", "run"]);
     assert_eq!(run.status.code(), Some(0), "{}", text(&run.stderr));
-    let trace = fs::read_to_string(folder.0.join("run/trace.csv")).expect("a trace");
+    let trace = folder.read("run/trace.csv");
     let row: Vec<f64> = trace
         .lines()
         .nth(1)
@@ -81,7 +49,7 @@ fn what_is_written_is_what_is_printed_and_what_sim_runs() {
         assert_eq!(Some(*a), b.as_f64());
     }
     // The text says the same.
-    let shown = folder.new_scene(&["three-finger", "cube", "--ideal", "--force", "--list", "2"]);
+    let shown = new_scene(&folder, &["three-finger", "cube", "--ideal", "--force", "--list", "2"]);
     let table = text(&shown.stdout);
     assert!(
         table.contains("chance to hold") && table.contains("finger-3") && table.contains("faces"),
@@ -92,35 +60,38 @@ fn what_is_written_is_what_is_printed_and_what_sim_runs() {
 
 #[test]
 fn a_file_is_overwritten_only_by_force() {
-    let folder = Folder::new("force");
+    let folder = Folder::new();
     let arguments = ["two-finger", "cube", "--out", "mine.toml"];
-    assert_eq!(folder.new_scene(&arguments).status.code(), Some(0));
-    folder.refused(
+    assert_eq!(new_scene(&folder, &arguments).status.code(), Some(0));
+    refused(
+        &folder,
         &arguments,
         "mine.toml: is there already; choose another with --out, or overwrite it with --force",
     );
-    assert_eq!(folder.new_scene(&[&arguments[..], &["--force"]].concat()).status.code(), Some(0));
+    assert_eq!(new_scene(&folder, &[&arguments[..], &["--force"]].concat()).status.code(), Some(0));
 }
 
 #[test]
 fn references_are_relative_to_the_file() {
-    let folder = Folder::new("relative");
-    fs::create_dir_all(folder.0.join("parts")).expect("a directory");
-    fs::create_dir_all(folder.0.join("scenes/deep")).expect("a directory");
+    let folder = Folder::new();
+    fs::create_dir_all(folder.path("scenes/deep")).expect("a directory");
     let block =
         "schema = 1\nname = \"block\"\ndensity_kg_m3 = 20\n[shape.box]\nsize_m = [0.05, 0.04, 0.05]\n";
-    fs::write(folder.0.join("parts/block.toml"), block).expect("a file");
-    let output = folder.new_scene(&[
-        "three-finger",
-        "parts/block.toml",
-        "--out",
-        "scenes/deep/s.toml",
-        "--any-attitude",
-        "--force-n",
-        "4",
-    ]);
+    folder.write("parts/block.toml", block);
+    let output = new_scene(
+        &folder,
+        &[
+            "three-finger",
+            "parts/block.toml",
+            "--out",
+            "scenes/deep/s.toml",
+            "--any-attitude",
+            "--force-n",
+            "4",
+        ],
+    );
     assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
-    let written = fs::read_to_string(folder.0.join("scenes/deep/s.toml")).expect("a scene");
+    let written = folder.read("scenes/deep/s.toml");
     assert!(
         written.contains("object = \"../../parts/block.toml\"") && written.contains("force_n = 4.0"),
         "{written}"
@@ -131,20 +102,23 @@ fn references_are_relative_to_the_file() {
 
 #[test]
 fn what_the_user_fixes_is_respected() {
-    let folder = Folder::new("fixed");
-    let output = folder.new_scene(&[
-        "three-finger",
-        "cube",
-        "--json",
-        "--face",
-        "finger-1=2",
-        "--point",
-        "3=-0.024,0,0",
-        "--position",
-        "0,0.01,0.13",
-        "--rotation-rpy",
-        "0,0,0",
-    ]);
+    let folder = Folder::new();
+    let output = new_scene(
+        &folder,
+        &[
+            "three-finger",
+            "cube",
+            "--json",
+            "--face",
+            "finger-1=2",
+            "--point",
+            "3=-0.024,0,0",
+            "--position",
+            "0,0.01,0.13",
+            "--rotation-rpy",
+            "0,0,0",
+        ],
+    );
     assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
     let placement = &json(&output)["placements"][0];
     assert_eq!((&placement["faces"][0], &placement["faces"][2]), (&Value::from(2), &Value::from(0)));
@@ -153,56 +127,57 @@ fn what_the_user_fixes_is_respected() {
 
 #[test]
 fn no_placement_is_told_with_exit_code_1() {
-    let folder = Folder::new("none");
+    let folder = Folder::new();
     let arguments = ["three-finger", "cube", "--position", "1,0,0"];
-    let output = folder.new_scene(&arguments);
+    let output = new_scene(&folder, &arguments);
     assert_eq!(output.status.code(), Some(1), "{}", text(&output.stderr));
     let reason = "the given position is none at which, in this attitude, all 3 fingertips get to contacts of theirs at once";
     assert!(text(&output.stdout).starts_with(&format!("no placement of cube in three-finger: {reason}\n")));
-    let output = folder.new_scene(&[&arguments[..], &["--json"]].concat());
+    let output = new_scene(&folder, &[&arguments[..], &["--json"]].concat());
     assert_eq!(output.status.code(), Some(1));
     let printed = json(&output);
     assert_eq!((&printed["placed"], printed["reason"].as_str()), (&Value::from(false), Some(reason)));
     assert!(printed["tests"].as_array().is_some_and(|tests| !tests.is_empty()));
-    assert_eq!(fs::read_dir(&folder.0).expect("a folder").count(), 0, "nothing is written");
+    assert_eq!(fs::read_dir(folder.path("")).expect("a folder").count(), 0, "nothing is written");
 }
 
 #[test]
 fn bad_input_has_exit_code_2() {
-    let folder = Folder::new("bad");
-    folder.refused(&["three-fingers", "cube"], "did you mean `three-finger`?");
-    folder.refused(&["three-finger", "cub"], "did you mean `cube`?");
-    folder.refused(&["three-finger", "nowhere/x.toml"], "nowhere/x.toml: no such file");
-    folder.refused(&["three-finger", "cube", "--face", "1"], "--face 1: has to be FINGER=...");
-    folder.refused(
+    let folder = Folder::new();
+    refused(&folder, &["three-fingers", "cube"], "did you mean `three-finger`?");
+    refused(&folder, &["three-finger", "cub"], "did you mean `cube`?");
+    refused(&folder, &["three-finger", "nowhere/x.toml"], "nowhere/x.toml: no such file");
+    refused(&folder, &["three-finger", "cube", "--face", "1"], "--face 1: has to be FINGER=...");
+    refused(
+        &folder,
         &["three-finger", "cube", "--face", "finger-9=1"],
         "there is no fingertip `finger-9`; did you mean `finger-",
     );
-    folder.refused(&["three-finger", "cube", "--face", "0=1"], "there is no fingertip `0`");
-    folder.refused(&["three-finger", "cube", "--face", "1=top"], "`top` is not a number of a face");
-    folder.refused(
+    refused(&folder, &["three-finger", "cube", "--face", "0=1"], "there is no fingertip `0`");
+    refused(&folder, &["three-finger", "cube", "--face", "1=top"], "`top` is not a number of a face");
+    refused(
+        &folder,
         &["three-finger", "cube", "--face", "1=6"],
         "contact.1.face: the object has no face 6; has to be between 0 and 5",
     );
-    folder.refused(
+    refused(
+        &folder,
         &["three-finger", "cube", "--position", "1,2"],
         "has to be three numbers with commas between them",
     );
-    folder.refused(
+    refused(
+        &folder,
         &["three-finger", "cube", "--position", "1,2,nan"],
         "has to be three numbers with commas between them",
     );
-    folder.refused(&["three-finger", "cube", "--force-n", "-1"], "control.force_n: -1.0 is out of range");
-    folder.refused(&["hand-arm", "cuboid", "--trunk", "arm=0.1"], "there is no joint `arm`");
-    fs::write(
-        folder.0.join("bad.toml"),
-        "schema = 1\nname = \"x\"\nmass_kg = 1\n[shape.box]\nsize_m = [0.1, -1, 0.1]\n",
-    )
-    .expect("a file");
-    folder.refused(
+    refused(&folder, &["three-finger", "cube", "--force-n", "-1"], "control.force_n: -1.0 is out of range");
+    refused(&folder, &["hand-arm", "cuboid", "--trunk", "arm=0.1"], "there is no joint `arm`");
+    folder.write("bad.toml", "schema = 1\nname = \"x\"\nmass_kg = 1\n[shape.box]\nsize_m = [0.1, -1, 0.1]\n");
+    refused(
+        &folder,
         &["three-finger", "./bad.toml"],
         "bad.toml:5: shape.box.size_m: the length along y has to be positive",
     );
-    let both = folder.new_scene(&["three-finger", "cube", "--any-attitude", "--rotation-rpy", "0,0,1"]);
+    let both = new_scene(&folder, &["three-finger", "cube", "--any-attitude", "--rotation-rpy", "0,0,1"]);
     assert_eq!(both.status.code(), Some(2));
 }
