@@ -64,9 +64,6 @@ pub struct Instants {
 
 impl Board {
     /// Starts an image.
-    ///
-    /// # Panics
-    /// If it does not start.
     pub fn start(image: &Path, pace: Pace) -> Self {
         let elf = fs::read(image).expect("the image can be read");
         let folder = TempDir::with_prefix("blindgrasp-").expect("a folder for sockets");

@@ -143,9 +143,6 @@ pub fn keep(scene: &Scene) -> Vec<Page> {
 
 /// Returns the ledger's excess with perfect sensors, at each sample, J: from the torques that acted, the turns that the
 /// joints really made, and the law's potentials where they really were.
-///
-/// # Panics
-/// If the scene has no law.
 pub fn true_excess_j(scene: &Scene, outcome: &Outcome) -> Vec<f64> {
     let laws = sim::laws(scene).unwrap_or_else(|error| panic!("{error}"));
     let place = |sample: &Sample| {

@@ -203,9 +203,6 @@ impl Case {
 }
 
 /// The law with the gains above.
-///
-/// # Panics
-/// If a gain is negative.
 pub fn law(hand: &RandomHand, k_st: f64, damping: &Torques, gravity: &Vector3<f64>) -> Laws<f64, JOINTS> {
     let config = LawsConfig {
         gains: PerGain { grasp: [FORCE_N, k_st], ..PerGain::all(0.0) },

@@ -22,9 +22,6 @@ const ANSWER: Duration = Duration::from_secs(20);
 const HELLO: Duration = Duration::from_millis(300);
 
 /// The frame of a message.
-///
-/// # Panics
-/// If it is longer than every request.
 pub fn frame(message: &impl Serialize) -> Vec<u8> {
     let mut buffer = [0; 4 * most_bytes(Packet::MOST_BYTES)];
     encode(message, &mut buffer).expect("the message fits").to_vec()
@@ -36,9 +33,6 @@ pub struct Heard(Vec<u8>);
 
 impl Heard {
     /// Returns the reply.
-    ///
-    /// # Panics
-    /// If it is no reply.
     pub fn reply(&self) -> Reply<'_> {
         Reply::decode(&self.0).unwrap_or_else(|error| panic!("{error}: {:02x?}", self.0))
     }
@@ -55,9 +49,6 @@ impl Heard {
     }
 
     /// Returns the reason for which the request was refused, if it was; `None`: done.
-    ///
-    /// # Panics
-    /// If it is no answer of this kind.
     pub fn refused(&self) -> Option<Refusal> {
         match self.reply() {
             Reply::Answer { refused, .. } => refused,
@@ -99,9 +90,6 @@ impl<T: Transport> Conversation<T> {
     }
 
     /// Sends bytes.
-    ///
-    /// # Panics
-    /// If they are not taken.
     pub fn send(&mut self, bytes: &[u8]) {
         let sent = self.transport.send(bytes, Instant::now() + ANSWER);
         sent.unwrap_or_else(|error| panic!("{} bytes: {error}", bytes.len()));
@@ -134,9 +122,6 @@ impl<T: Transport> Conversation<T> {
     }
 
     /// The next answer; records are put aside.
-    ///
-    /// # Panics
-    /// If there is none in time.
     pub fn answer(&mut self) -> Heard {
         let deadline = Instant::now() + ANSWER;
         loop {
@@ -150,17 +135,11 @@ impl<T: Transport> Conversation<T> {
     }
 
     /// The payloads of the next frames, as they are.
-    ///
-    /// # Panics
-    /// If they do not come in time.
     pub fn payloads(&mut self, count: usize) -> Vec<Vec<u8>> {
         (0..count).map(|_| self.hear(ANSWER).expect("a frame comes").0).collect()
     }
 
     /// The next record, be it one that was put aside.
-    ///
-    /// # Panics
-    /// If there is none in time, or an answer that nobody waits for.
     pub fn record(&mut self) -> Record {
         if !self.records.is_empty() {
             return self.records.remove(0);
@@ -179,9 +158,6 @@ impl<T: Transport> Conversation<T> {
     }
 
     /// The answer to any message, whose number it has to have.
-    ///
-    /// # Panics
-    /// If there is none.
     pub fn ask_as_is(&mut self, message: &impl Serialize, sequence: u16) -> Heard {
         self.send(&frame(message));
         let heard = self.answer();
@@ -190,9 +166,6 @@ impl<T: Transport> Conversation<T> {
     }
 
     /// The answer to the next request of this session.
-    ///
-    /// # Panics
-    /// If there is none.
     pub fn ask(&mut self, request: Request) -> Heard {
         let packet = self.packet(request);
         self.ask_as_is(&packet, packet.sequence)
@@ -200,9 +173,6 @@ impl<T: Transport> Conversation<T> {
 
     /// Waits until the firmware answers at all. What is sent before its line is there, is lost; so the question, which is
     /// none that it could know, is repeated.
-    ///
-    /// # Panics
-    /// If it does not.
     pub fn knock(&mut self) {
         let deadline = Instant::now() + START;
         let mut knocks = 0_u16;
@@ -220,9 +190,6 @@ impl<T: Transport> Conversation<T> {
     }
 
     /// Begins a session.
-    ///
-    /// # Panics
-    /// If there is no identity.
     pub fn hello(&mut self) -> Heard {
         let heard = self.ask(Request::Hello { interface_version: INTERFACE_VERSION });
         match heard.reply() {

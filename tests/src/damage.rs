@@ -67,9 +67,6 @@ impl Stretches {
     }
 
     /// The next one.
-    ///
-    /// # Panics
-    /// If the receiver accepts what was not sent.
     pub fn next_stretch(&mut self) -> Stretch {
         let kind = Damage::ALL[self.made % Damage::ALL.len()];
         self.made += 1;

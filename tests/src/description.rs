@@ -35,9 +35,6 @@ pub struct Placed {
 
 impl Description {
     /// The hand that is described.
-    ///
-    /// # Panics
-    /// If it is none.
     pub fn hand<const J: usize, const F: usize>(&self) -> Hand<f64, J, F> {
         match Hand::new(&self.joints, &self.fingertips) {
             Ok(hand) => hand,

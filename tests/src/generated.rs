@@ -49,9 +49,6 @@ pub fn check(document: &str, name: &str, text: &str) {
 }
 
 /// Compares a file with what it has to be. With `BLINDGRASP_BLESS=1` in the environment it is written instead.
-///
-/// # Panics
-/// If it is something else.
 pub fn check_file(path: &str, text: &str) {
     let there = std::fs::read_to_string(root().join(path)).unwrap_or_default();
     if there == text {

@@ -99,17 +99,11 @@ pub struct Grasp {
 impl Grasp {
     /// Puts fingers like those of Table IV to an object, at rest, each pressed in as Eq. 57 asks for. Joints that move
     /// several fingers stay at zero.
-    ///
-    /// # Panics
-    /// If a finger can't reach its point.
     pub fn new(description: Description, held: &Held) -> Self {
         Self::with_fingertips(description, held, FINGERTIP)
     }
 
     /// The same with fingertips of another material.
-    ///
-    /// # Panics
-    /// If a finger can't reach its point.
     pub fn with_fingertips(description: Description, held: &Held, fingertip: FingertipModel) -> Self {
         let hand: Hand = description.hand();
         let trunk = hand.joint_count() - FINGER_JOINTS * hand.fingertip_count();
@@ -149,9 +143,6 @@ impl Grasp {
     }
 
     /// The plant at the start.
-    ///
-    /// # Panics
-    /// If the model has no equations of motion.
     pub fn plant(&self, substep_s: f64) -> Plant {
         match Plant::new(self.model.clone(), self.start, substep_s) {
             Ok(plant) => plant,
@@ -181,17 +172,11 @@ impl Grasp {
     }
 
     /// Advances a plant by some sub-steps under the law, and shows it solved at the beginning of each.
-    ///
-    /// # Panics
-    /// If the grasp is lost.
     pub fn run(&self, plant: &mut Plant, steps: usize, each: impl FnMut(&Plant)) {
         self.drive(plant, steps, |plant| self.torques(plant), each);
     }
 
     /// Advances a plant by some sub-steps under any torques, and shows it solved at the beginning of each.
-    ///
-    /// # Panics
-    /// If the grasp is lost.
     pub fn drive(
         &self,
         plant: &mut Plant,

@@ -15,9 +15,6 @@ pub fn root() -> PathBuf {
 }
 
 /// Path of the ELF of the image `hand` or `pil` for a hand; nothing is built anew that is there already.
-///
-/// # Panics
-/// If it does not build.
 pub fn image(kind: &str, hand: &str) -> PathBuf {
     let mut command = Command::new("tests/firmware-toolchain");
     // As the command `pil` has it: unset and set to the default are not the same to cargo, which would build anew.
@@ -43,9 +40,6 @@ pub fn image(kind: &str, hand: &str) -> PathBuf {
 }
 
 /// The same as a file of its own, which stays as it is while the image is built for another hand.
-///
-/// # Panics
-/// If it does not build, or can't be copied.
 pub fn kept_image(kind: &str, hand: &str) -> PathBuf {
     static KEPT: Mutex<BTreeMap<(String, String), PathBuf>> = Mutex::new(BTreeMap::new());
     // Building one after the other: cargo writes all hands to the same path.

@@ -1,4 +1,4 @@
-//! Helpers that several of the tests use.
+//! Helpers that several of the tests use. They panic where something is not as a test needs it.
 //!
 //! - `board` (feature `firmware`): the image `hand`, running in QEMU; `conversation`: the host's end of a link, frame by
 //!   frame; `damage`: frames that a line has damaged.

@@ -12,9 +12,6 @@ const NOISE: f64 = 2e-4;
 
 /// The same body as a mesh with noise, as the text of an ASCII STL in millimetres: faces cut into small triangles, whose
 /// vertices are each moved a little.
-///
-/// # Panics
-/// If the corners are none of a polyhedron's.
 pub fn noisy_stl(draw: &mut Draw, body: &RandomPolyhedron) -> String {
     let corners: Vec<Vector3<f64>> = body.corners_m.iter().map(|&corner| corner.into()).collect();
     let shape = Polyhedron::hull(&corners).expect("a polyhedron");

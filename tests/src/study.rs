@@ -97,9 +97,6 @@ impl Study {
 }
 
 /// Does something with each of many things, on all processors; the results in their order.
-///
-/// # Panics
-/// If one of them does.
 pub fn spread<T: Sync, R: Send>(things: &[T], work: impl Fn(&T) -> R + Sync) -> Vec<R> {
     let results = Mutex::new(Vec::new());
     let next = Mutex::new(things.iter().enumerate());
@@ -122,9 +119,6 @@ pub fn spread<T: Sync, R: Send>(things: &[T], work: impl Fn(&T) -> R + Sync) -> 
 }
 
 /// Runs a scene.
-///
-/// # Panics
-/// If something is not a number.
 pub fn simulate(scene: &Scene) -> Summary {
     let run = Simulation::new(scene).expect("a scene that was built can be simulated").run();
     for sample in &run.samples {

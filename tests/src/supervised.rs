@@ -151,9 +151,6 @@ impl Outcome {
 
 /// The configuration of a scene's controller with the two watches that only a hand with a host has: heartbeat and
 /// deadline, as its firmware has them.
-///
-/// # Panics
-/// If the scene's hand has no firmware.
 pub fn config(scene: &Scene) -> Config<MAX_JOINTS> {
     let firmware = HandModel::of(scene).unwrap_or_else(|error| panic!("{error}")).config;
     let mut config = scene.controller_config();
@@ -163,26 +160,17 @@ pub fn config(scene: &Scene) -> Config<MAX_JOINTS> {
 }
 
 /// A built-in scene with settings `KEY=VALUE`.
-///
-/// # Panics
-/// If there is something wrong with them.
 pub fn scene(name: &str, settings: &[&str]) -> Scene {
     let settings: Vec<String> = settings.iter().map(|&setting| setting.to_owned()).collect();
     Scene::load(name, &settings).unwrap_or_else(|error| panic!("{error}"))
 }
 
 /// Runs a course.
-///
-/// # Panics
-/// If the scene can't be simulated.
 pub fn run(scene: &Scene, course: &Course) -> Outcome {
     run_with(scene, &config(scene), course)
 }
 
 /// Runs a course with a configuration of one's own.
-///
-/// # Panics
-/// If the scene can't be simulated.
 pub fn run_with(scene: &Scene, config: &Config<MAX_JOINTS>, course: &Course) -> Outcome {
     let params = Params::new(scene.hand.cast(), config).unwrap_or_else(|error| panic!("{error}"));
     let controller =
@@ -208,9 +196,6 @@ pub fn push_nm(scene: &Scene, fingertip: usize, force_n: Vector3<f64>) -> [f32; 
 
 /// Mechanical energy of hand and object at each sample from one on, J: kinetic, of the squeezed fingertips, and of the
 /// links' weight. Without torque it can only fall, but for what the friction of the joints has stored.
-///
-/// # Panics
-/// If the scene has no equations of motion.
 pub fn mechanical_energy_j(scene: &Scene, outcome: &Outcome, from: usize) -> Vec<f64> {
     let energy = |sample: &blindgrasp::sim::sample::Sample| {
         let padded = |values: &[f64]| std::array::from_fn(|k| values.get(k).copied().unwrap_or(0.0));

@@ -31,9 +31,6 @@ pub struct Image {
 
 impl Image {
     /// Reads an ELF.
-    ///
-    /// # Panics
-    /// If it is none, or one without symbols.
     pub fn read(elf: &[u8]) -> Self {
         let file = object::File::parse(elf).expect("an ELF");
         let text = file.section_by_name(".text").expect("a section of code");
@@ -81,9 +78,6 @@ impl Image {
     }
 
     /// Address of the function with a name.
-    ///
-    /// # Panics
-    /// If there is none, or several.
     pub fn address(&self, name: &str) -> u32 {
         let found: Vec<u32> = (self.functions.iter())
             .filter(|(_, function)| function.name.split(' ').any(|n| n == name))
@@ -112,9 +106,6 @@ impl Image {
     }
 
     /// Most bytes of stack below a function, with its own, and the way there.
-    ///
-    /// # Panics
-    /// If it calls itself in the end.
     pub fn deepest(&self, from: u32) -> (u32, Vec<String>) {
         self.deepest_below(from, &mut Vec::new(), &mut BTreeMap::new())
     }
