@@ -1,9 +1,9 @@
 //! Inverse kinematics on the hands that are shipped, and on one with a trunk.
 
-use super::Numbers;
 use crate::Scene;
 use blindgrasp_body::inverse_kinematics::{REACHED_M, is_trunk, own_joints, place};
 use blindgrasp_body::{Hand, MAX_JOINTS, Posture};
+use blindgrasp_meshes::Numbers;
 use blindgrasp_shared::hand::{Fingertip, Joint, Link};
 use nalgebra::{Matrix3, Vector3};
 
