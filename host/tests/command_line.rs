@@ -264,7 +264,7 @@ fn bad_scene_files_are_refused_with_file_key_and_remedy() {
     ];
     for (what, from, to, words) in cases {
         assert!(whole.contains(from), "{what}: the scene has no `{from}`");
-        let path = folder.write("bad.toml", &whole.replacen(from, to, 1));
+        let path = folder.write("bad.toml", whole.replacen(from, to, 1));
         assert_refused(&["sim", &path], &[&["bad.toml"], *words].concat());
     }
     // Zero fingers: no fingertip, no contact.

@@ -33,7 +33,9 @@ fn a_urdf_becomes_a_hand_that_grasps() {
 #[test]
 fn files_name_each_other_wherever_they_are() {
     let folder = Folder::new();
-    ["parts", "hands"].map(|name| fs::create_dir(folder.path(name)).expect("a folder"));
+    for name in ["parts", "hands"] {
+        fs::create_dir(folder.path(name)).expect("a folder");
+    }
     let (out, said) = folder.done(&["hand", "export", "two-finger", "--urdf"]);
     assert_eq!(said, "");
     folder.done(&["hand", "export", "two-finger", "--urdf", "--out", "parts/two.urdf"]);

@@ -123,7 +123,8 @@ fn at_any_tick_all_but_the_last_half_second_is_in_the_file() {
         // It has its name since the first write. Just before and after others, and anywhere between.
         if tick > 501 && (tick % 500 < 3 || tick % 83 == 0) {
             let (entries, damage, _) = read(&path);
-            let received = entries.iter().filter(|entry| matches!(entry.what, What::Received(_))).count() as u64;
+            let received =
+                entries.iter().filter(|entry| matches!(entry.what, What::Received(_))).count() as u64;
             assert!(received + 500 >= tick && damage.unfinished, "{received} of {tick}");
         }
     }
