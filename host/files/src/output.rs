@@ -54,7 +54,16 @@ fn as_well(path: &Path, input: &Path) -> String {
 
 impl OutputError {
     fn of(path: &Path) -> impl Fn(io::Error) -> Self {
-        move |source| Self::Io { path: path.to_owned(), source }
+        move |source| {
+            let has_no_folder = source.kind() == io::ErrorKind::NotFound
+                && path.parent().is_some_and(|folder| folder != Path::new("") && !folder.exists());
+            let source = if has_no_folder {
+                io::Error::new(source.kind(), "there is no such folder; make it first")
+            } else {
+                source
+            };
+            Self::Io { path: path.to_owned(), source }
+        }
     }
 }
 

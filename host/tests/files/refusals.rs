@@ -101,6 +101,9 @@ fn what_was_there_stays_until_the_new_one_is_whole() {
     fs::create_dir(folder.join("d.csv")).unwrap();
     let output = run(folder, &["export", "run.mcap", "--to", "csv", "--out", "d.csv", "--force"]);
     assert!(told(&output).contains("cannot write d.csv: it is a folder, not a file"), "{}", told(&output));
+    let output = run(folder, &["export", "run.mcap", "--to", "csv", "--out", "nowhere/d.csv"]);
+    let expected = "blindgrasp: cannot write nowhere/d.csv: there is no such folder; make it first";
+    assert_eq!(told(&output).trim(), expected);
     // A link stays one, and what it leads to is replaced.
     symlink("old.csv", folder.join("link.csv")).unwrap();
     succeed(folder, &["export", "run.mcap", "--to", "csv", "--out", "link.csv", "--force"]);

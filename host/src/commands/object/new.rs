@@ -74,7 +74,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
 fn relative(mesh: &Path, out: &Path) -> anyhow::Result<String> {
     let absolute = |path: &Path| {
         let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
-        std::fs::canonicalize(folder).with_context(|| format!("{}: no such folder", folder.display()))
+        std::fs::canonicalize(folder).with_context(|| format!("folder {}", folder.display()))
     };
     let (from, to) = (absolute(out)?, absolute(mesh)?);
     let name = mesh.file_name().context("the mesh has no name")?;
