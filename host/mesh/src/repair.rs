@@ -26,7 +26,7 @@ pub struct Repaired {
     pub vertices: Vec<Vector3<f64>>,
     /// The vertices of each triangle, counterclockwise from outside.
     pub triangles: Vec<[usize; 3]>,
-    /// What was repaired, in words.
+    /// Notices of what was repaired, in words.
     pub notices: Vec<String>,
 }
 

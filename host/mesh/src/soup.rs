@@ -5,9 +5,9 @@ use nalgebra::Vector3;
 /// A fault of a file, and the remedy.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Problem {
-    /// What is wrong, with its place in the file.
+    /// The fault, with its place in the file.
     pub what: String,
-    /// What to do.
+    /// The remedy.
     pub remedy: String,
 }
 

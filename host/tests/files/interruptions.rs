@@ -42,7 +42,7 @@ const COMMANDS: &[(&[&str], &[&str])] = &[
     (&["console", "--port", "../link", "--out", "out.mcap"], &["out.mcap"]),
 ];
 
-/// What is there before, and is replaced by force.
+/// Content of a file that is there before, and is replaced by force.
 const OLD: &[u8] = b"what was there before";
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -71,13 +71,13 @@ fn contents(folder: &Path, written: &[&str]) -> Files {
     files
 }
 
-/// How much is left that is not whole: beside files and folders, or in a folder that was there before.
+/// The number of files and folders left that are not whole: beside files and folders, or in a folder that was there before.
 fn left_over(folder: &Path) -> usize {
     let beside = names(folder).iter().filter(|name| name.ends_with(".partial")).count();
     beside + usize::from(folder.join("out/.partial").exists())
 }
 
-/// Whether a file is what the command writes when nothing happens to it.
+/// Returns `true` if a file is what the command writes when nothing happens to it.
 fn is_whole(path: &Path, bytes: &[u8], folder: &Path, whole: &Files) -> bool {
     let name = path.file_name().unwrap();
     // How long a run takes, and when it was, is not the same twice.
@@ -119,7 +119,7 @@ fn serve(folder: &Path) -> Serving {
     Serving(child)
 }
 
-/// Whether a file system of a given size can be had, in a namespace of its own.
+/// Returns `true` if a file system of a given size can be had, in a namespace of its own.
 fn has_small_disks(folder: &Path) -> bool {
     let script = format!("mount -t tmpfs -o size=64k t {}", folder.display());
     Command::new("unshare").args(["-rm", "sh", "-c", &script]).status().is_ok_and(|status| status.success())

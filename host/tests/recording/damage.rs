@@ -251,7 +251,7 @@ fn ten_thousand_damaged_copies_give_nothing_that_was_not_recorded() {
     assert!(longest < Duration::from_secs(5), "{longest:?}");
 }
 
-/// Where the chunks of a file are, and how long they are, with their heads.
+/// Places and lengths of the chunks of a file, with their heads.
 fn chunks(bytes: &[u8]) -> Vec<std::ops::Range<usize>> {
     let mut chunks = Vec::new();
     let mut at = 8;

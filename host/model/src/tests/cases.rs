@@ -7,7 +7,7 @@ pub(crate) struct Case {
     pub(crate) of: Option<&'static str>,
     /// Replacements: the old text (`-`), the new one (`+`), and in how many places (`-2`).
     pub(crate) edits: Vec<(String, String, usize)>,
-    /// What is said (`=`), and the place that it is said of where it needs a name (`@`).
+    /// The message (`=`), and the place that it is said of where it needs a name (`@`).
     pub(crate) said: Vec<(Option<&'static str>, &'static str)>,
 }
 

@@ -31,7 +31,7 @@ const SLOWEST: f64 = 0.8;
 pub struct Decoded {
     /// The device of the recording.
     pub device: usize,
-    /// Which of its sessions, from 1 on.
+    /// Number of its session, from 1 on.
     pub session: u32,
     /// The time of the tick, on the host's clock; never before that of the record before.
     pub at: Stamp,

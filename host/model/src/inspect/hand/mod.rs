@@ -170,7 +170,7 @@ fn still(specimen: &Specimen, found: &mut Found) {
     }
 }
 
-/// What no rule knows of: a hand without errors is one that a firmware can be built with, gains or not.
+/// The last check, for faults that no rule knows of: a hand without errors is one that a firmware can be built with, gains or not.
 fn confirm(specimen: &Specimen, found: &mut Found) {
     let is_broken = found.findings.iter().any(|finding| finding.severity == Severity::Error);
     if is_broken || specimen.file.control.is_none() {
