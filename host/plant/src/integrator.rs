@@ -20,9 +20,10 @@
 //! Eq. 21 is read as `I dw/dt + w x I w`.
 
 use super::contact::{Contact, Rows};
-use super::coupling::{Branches, Coupling, Everything, ObjectMass};
+use super::coupling::Coupling;
 use super::friction::{FrictionTorque, stretch, torque};
 use super::ledger::Flows;
+use super::mass::{Branches, Everything, ObjectMass};
 use super::model::{ContactForce, Lost, ModelError, Motion, PlantModel};
 use super::push::share;
 use super::rotation::{solve_inertia, turn_freely, world_inertia};
@@ -113,7 +114,7 @@ impl Plant {
         };
         plant.place();
         let object = ObjectMass { mass_kg: plant.model.object.mass_kg, inertia_kg_m2 };
-        if plant.coupling.factorize_mass(&plant.mass, &[0.0; MAX_JOINTS], &object) > LEAST_PIVOT {
+        if plant.coupling.mass.factorize(&plant.mass, &[0.0; MAX_JOINTS], &object) > LEAST_PIVOT {
             Ok(plant)
         } else {
             Err(ModelError::NoMass)
@@ -218,7 +219,7 @@ impl Plant {
         let mut push = Everything::ZERO;
         let mut softness = [0.0; MAX_JOINTS];
         self.joint_forces(torques_nm, tau, &mut push, &mut softness);
-        if !(self.coupling.factorize_mass(&self.mass, &softness, &object) > LEAST_PIVOT) {
+        if !(self.coupling.mass.factorize(&self.mass, &softness, &object) > LEAST_PIVOT) {
             return Err(Lost::Diverged);
         }
         let weight = self.model.object_gravity_m_s2 * object.mass_kg;

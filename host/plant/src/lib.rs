@@ -10,6 +10,7 @@ pub mod friction;
 pub mod integrator;
 pub mod ledger;
 mod linear;
+mod mass;
 pub mod model;
 mod push;
 mod rotation;
