@@ -9,6 +9,7 @@
 //!   of the description; the inertia is a full tensor in them.
 
 mod clearance;
+mod convex;
 mod error;
 mod face;
 mod hull;
@@ -24,6 +25,7 @@ pub mod surface;
 mod tests;
 
 pub use clearance::Obstacles;
+pub use convex::{Closest, Convex};
 pub use error::counted;
 pub use error::{MeshFault, PolyhedronError};
 pub use mesh::{MAX_TRIANGLES, bounds_m, diagonal_m};

@@ -21,8 +21,14 @@ pub struct Flows {
     pub indentation: f64,
     /// Taken by the torsional viscosity of the fingertips, `2 T_i`.
     pub torsion: f64,
-    /// Taken by the friction of the joints; a little of it is lent to their springs.
+    /// Taken by the friction of the joints and the ends of their ranges; a little of it is lent to their springs.
     pub friction: f64,
+    /// Taken by friction of contacts that slip.
+    pub slip: f64,
+    /// By tables that move.
+    pub tables: f64,
+    /// By the weight of links and object, where contacts slip; where they roll it is potential energy.
+    pub weight: f64,
     /// Squares of the joint speeds, rad^2/s^2 (rad^2/s when summed): what a damping gain of one would take.
     pub joint_speeds_squared: JointVector,
     /// Square of the object's velocity, m^2/s^2 (m^2/s).
@@ -39,6 +45,9 @@ impl Flows {
         indentation: 0.0,
         torsion: 0.0,
         friction: 0.0,
+        slip: 0.0,
+        tables: 0.0,
+        weight: 0.0,
         joint_speeds_squared: [0.0; MAX_JOINTS],
         velocity_squared: 0.0,
         spin_squared: 0.0,
@@ -46,7 +55,7 @@ impl Flows {
 
     /// Returns the energy that all dampers and friction took.
     pub fn dissipated(&self) -> f64 {
-        self.indentation + self.torsion + self.friction
+        self.indentation + self.torsion + self.friction + self.slip
     }
 
     /// These flows and those of a power during `time_s`.
@@ -57,6 +66,9 @@ impl Flows {
         sum.indentation += time_s * power.indentation;
         sum.torsion += time_s * power.torsion;
         sum.friction += time_s * power.friction;
+        sum.slip += time_s * power.slip;
+        sum.tables += time_s * power.tables;
+        sum.weight += time_s * power.weight;
         for (sum, power) in sum.joint_speeds_squared.iter_mut().zip(&power.joint_speeds_squared) {
             *sum += time_s * power;
         }

@@ -5,6 +5,7 @@
 //! them together. A `push` comes from outside. A [`ledger`] is kept of the energy that flows in and out.
 
 pub mod contact;
+pub mod coulomb;
 mod coupling;
 pub mod friction;
 pub mod integrator;

@@ -1,0 +1,18 @@
+//! Contact that sticks exactly, slips when it must, breaks and comes back: soft fingertips, a free convex object, and tables,
+//! with Coulomb friction.
+//!
+//! Fingertips and corners are soft along the normal, so touch, lift-off and impact are smooth; only friction is not. The
+//! parts: `touch` finds contacts and makes their rows, `material` has normal forces, `solve` finds the forces of one step,
+//! and [`Plant`] advances in time. [`World`] says what there is besides hand and object.
+
+mod linear;
+mod material;
+mod plant;
+mod solve;
+mod touch;
+mod world;
+
+pub use plant::{Contact, Plant};
+pub use solve::Counters;
+pub use touch::{Pair, Touch};
+pub use world::{Friction, Path, Table, World, WorldError};

@@ -1,0 +1,710 @@
+//! The plant's advance in time: the leapfrog of [`crate::integrator`] with contacts that come and go, stick and slip.
+//!
+//! - The velocities of a whole step are solved for together with the contacts' forces (`solve.rs`); reflecting those of the
+//!   half step before about them gives the next ones. Friction never adds energy that way.
+//! - Normal forces are averages along the path of the two half steps around it (`material.rs`).
+//! - Where a contact begins to stick, what is left of its slip would come back with alternating sign for ever. So the
+//!   velocities after that step are projected, orthogonally in the metric of the kinetic energy, onto no slip of all
+//!   sticking contacts where these are half a step later. That only takes energy; it is booked as friction.
+
+use super::material::{Material, Response};
+use super::solve::{Counters, Problem};
+use super::touch::{Materials, Pair, Placed, Touch};
+use super::world::{World, WorldError};
+use crate::friction::{FrictionTorque, stretch, torque};
+use crate::ledger::Flows;
+use crate::mass::{Branches, Everything, MassFactor, ObjectMass, dot};
+use crate::model::{Lost, ModelError, Motion, PlantModel};
+use crate::push::share;
+use crate::rotation::{solve_inertia, turn_freely};
+use blindgrasp_body::dynamics::{JointVector, bias_torques};
+use blindgrasp_body::polyhedron::Convex;
+use blindgrasp_body::{MAX_CHAIN, MAX_JOINTS, Posture};
+use blindgrasp_shared::math::Real;
+use nalgebra::Vector3;
+
+#[cfg(test)]
+mod tests;
+
+/// The least relative pivot of a mass matrix.
+const LEAST_PIVOT: f64 = 1e-12;
+/// Stiffness of a corner of the object on a table, N/m: that of hard plastic on wood.
+const CORNER_N_M: f64 = 6e4;
+/// Stiffness of the end of a joint's range, N m/rad.
+const LIMIT_NM: f64 = 20.0;
+/// Damping of both, of critical.
+const DAMPING: f64 = 1.75;
+/// Gap that a contact may have and still be solved for, beyond what velocities close in two steps, m (or rad).
+const NEAR: f64 = 2e-4;
+/// Gap beyond which it is not even looked at, m.
+const FAR_M: f64 = 0.01;
+
+/// A contact's force at one instant.
+#[derive(Clone, Copy, Debug)]
+pub struct Contact {
+    /// The bodies and the geometry.
+    pub touch: Touch,
+    /// Normal force, N: on the second body along the normal. N m at the end of a joint's range.
+    pub normal_n: f64,
+    /// Force along the tangents on the second body, N.
+    pub tangential_n: [f64; 2],
+    /// Torsional torque on the second body along the normal, N m.
+    pub torsion_nm: f64,
+    /// Velocities of the second body against the first: opening of the gap, slip along the tangents, m/s.
+    pub velocity_m_s: [f64; 3],
+    /// Torsion, rad/s.
+    pub torsion_rad_s: f64,
+    /// Its force is inside of the limit of friction.
+    pub sticks: bool,
+}
+
+/// The plant, stepped in time.
+#[derive(Clone, Debug)]
+pub struct Plant {
+    model: PlantModel,
+    world: World,
+    shape: Convex,
+    materials: Materials,
+    substep_s: f64,
+    motion: Motion,
+    /// Velocities at the half step before.
+    before: Everything,
+    /// Angular momentum of the object at the half step before, kg m^2/s.
+    spin_momentum: Vector3<f64>,
+    /// Velocities at the whole step before, for extrapolation.
+    previous: Everything,
+    /// Stretch of the joints' friction springs, rad.
+    stretch_rad: JointVector,
+    started: bool,
+    /// Sub-steps since the start.
+    steps: u64,
+    /// At this instant; and half a step after it, where a contact begins to stick.
+    now: Placed,
+    ahead: Placed,
+    mass: MassFactor,
+    /// Contacts at this instant, their rows, and these times the inverse factor of the mass matrix.
+    touches: Vec<Touch>,
+    rows: Vec<Everything>,
+    whitened: Vec<Everything>,
+    /// Rates of the contacts' depths half a step ago.
+    rates_m_s: Vec<f64>,
+    problem: Problem,
+    projection: Problem,
+    contacts: Vec<Contact>,
+    /// Contacts that stuck at the instant before.
+    stuck: Vec<Pair>,
+    solution: Everything,
+    /// External forces on the object at this instant: of pushes, and its weight.
+    pushed: [f64; 6],
+    gravity_m_s2: [Vector3<f64>; 2],
+    friction: [FrictionTorque; MAX_JOINTS],
+    power: Flows,
+    work: Flows,
+    /// The contact's law is that of the rolling contact: normal force frozen at the step, torsion viscous.
+    as_rolling: bool,
+}
+
+impl Plant {
+    /// Puts a plant at a motion, to be advanced by `substep_s` at a time. Contacts of a plant at rest stick from the start.
+    ///
+    /// # Errors
+    /// A model or a world that can't be simulated.
+    pub fn new(model: PlantModel, world: World, motion: Motion, substep_s: f64) -> Result<Self, WorldError> {
+        let longest = Branches::of(&model.hand).longest();
+        if longest > MAX_CHAIN {
+            return Err(ModelError::ChainTooLong { joints: longest }.into());
+        }
+        let shape = world.check(model.hand.fingertip_count(), &model.object.shape)?;
+        let mut plant = Self {
+            materials: Materials {
+                fingertips: model.fingertips.iter().map(Material::of_fingertip).collect(),
+                corner: corner(&model, substep_s),
+                limits: Vec::new(),
+            },
+            shape,
+            substep_s,
+            motion,
+            before: velocities(&motion),
+            spin_momentum: Vector3::zeros(),
+            previous: velocities(&motion),
+            stretch_rad: [0.0; MAX_JOINTS],
+            started: false,
+            steps: 0,
+            now: Placed::new(),
+            ahead: Placed::new(),
+            mass: MassFactor::new(&model.hand),
+            touches: Vec::new(),
+            rows: Vec::new(),
+            whitened: Vec::new(),
+            rates_m_s: Vec::new(),
+            problem: Problem::default(),
+            projection: Problem::default(),
+            contacts: Vec::new(),
+            stuck: Vec::new(),
+            solution: velocities(&motion),
+            pushed: [0.0; 6],
+            gravity_m_s2: [Vector3::zeros(); 2],
+            friction: [FrictionTorque::NONE; MAX_JOINTS],
+            power: Flows::NONE,
+            work: Flows::NONE,
+            as_rolling: false,
+            model,
+            world,
+        };
+        plant.place();
+        let inertia_kg_m2 = plant.now.inertia_kg_m2(&plant.model);
+        plant.spin_momentum = inertia_kg_m2 * motion.spin_rad_s;
+        let object = ObjectMass { mass_kg: plant.model.object.mass_kg, inertia_kg_m2 };
+        if !(plant.mass.factorize(&plant.now.mass, &[0.0; MAX_JOINTS], &object) > LEAST_PIVOT) {
+            return Err(ModelError::NoMass.into());
+        }
+        if plant.world.joint_limits {
+            plant.materials.limits = limits(&plant.mass, plant.model.hand.joint_count(), substep_s);
+        }
+        if motion == Motion::at_rest(motion.angles_rad, motion.position_m, motion.attitude) {
+            let Self { now, model, world, shape, materials, stuck, .. } = &mut plant;
+            now.touches((model, world), (shape, materials), 0.0, FAR_M, |touch| {
+                if touch.depth_m > 0.0 {
+                    stuck.push(touch.pair);
+                }
+            });
+        }
+        Ok(plant)
+    }
+
+    /// Lets the contacts of fingertips and object do as the rolling ones do, for a comparison with these: normal forces
+    /// frozen at the step, torsion viscous, nothing projected.
+    #[doc(hidden)]
+    pub fn compare_with_rolling(mut self) -> Self {
+        self.as_rolling = true;
+        for friction in &mut self.world.fingertip_friction {
+            friction.torsion_m = 0.0;
+        }
+        self
+    }
+
+    /// The model.
+    pub fn model(&self) -> &PlantModel {
+        &self.model
+    }
+
+    /// Positions of this instant; velocities extrapolated to it until [`Self::solve`] has been called, exact afterwards.
+    pub fn motion(&self) -> &Motion {
+        &self.motion
+    }
+
+    /// Posture of the hand at this instant.
+    pub fn posture(&self) -> &Posture {
+        &self.now.posture
+    }
+
+    /// Contacts at this instant with their forces, after [`Self::solve`]: those that touch, and some that nearly do.
+    pub fn contacts(&self) -> &[Contact] {
+        &self.contacts
+    }
+
+    /// Counters of what the solver did since the start.
+    pub fn counters(&self) -> &Counters {
+        &self.problem.counters
+    }
+
+    /// Kinetic energy, J.
+    pub fn kinetic_energy_j(&self) -> f64 {
+        let n = self.model.hand.joint_count();
+        let Motion { speeds_rad_s: speeds, velocity_m_s: v, spin_rad_s: w, .. } = &self.motion;
+        let mut hand = 0.0;
+        for (row, speed) in self.now.mass.iter().zip(speeds).take(n) {
+            for (entry, other) in row.iter().zip(speeds).take(n) {
+                hand += entry * speed * other;
+            }
+        }
+        let inertia = self.now.inertia_kg_m2(&self.model);
+        0.5 * (hand + self.model.object.mass_kg * v.norm_squared() + w.dot(&(inertia * w)))
+    }
+
+    /// Elastic energy of all contacts and joint limits, J.
+    pub fn elastic_energy_j(&self) -> f64 {
+        self.touches.iter().map(|touch| touch.material.energy_j(touch.depth_m)).sum()
+    }
+
+    /// Returns the flows in and out of kinetic and elastic energy from the start to this instant, after [`Self::solve`]: work,
+    /// J.
+    pub fn flows(&self) -> Flows {
+        if self.started { self.work.after(&self.power, 0.5 * self.substep_s) } else { Flows::NONE }
+    }
+
+    /// Solves for velocities and forces at this instant under joint torques (N m).
+    ///
+    /// # Errors
+    /// The motion diverged.
+    pub fn solve(&mut self, torques_nm: &JointVector) -> Result<(), Lost> {
+        let tau = 0.5 * self.substep_s;
+        let path_s = self.path_s();
+        let object = self.object_mass();
+        set_tail(&mut self.before.object, &solve_inertia(&object.inertia_kg_m2, &self.spin_momentum));
+        let mut push = Everything::ZERO;
+        let mut softness = [0.0; MAX_JOINTS];
+        self.external_forces(torques_nm, tau, &mut push, &mut softness);
+        if !(self.mass.factorize(&self.now.mass, &softness, &object) > LEAST_PIVOT) {
+            return Err(Lost::Diverged);
+        }
+        self.mass.whiten(&mut push);
+        self.collect();
+        self.set_problem(tau, &push);
+
+        let Self { touches, rates_m_s, problem, as_rolling, started, .. } = self;
+        let law = |k: usize, rate_m_s: f64| {
+            respond(&touches[k], rates_m_s[k], rate_m_s, (path_s, tau), (*started, *as_rolling))
+        };
+        problem.solve(law, rates_m_s);
+
+        for (row, force) in self.whitened.iter().zip(&self.problem.forces) {
+            add(&mut push, *force, row);
+        }
+        self.mass.unwhiten(&mut push);
+        self.solution = self.before;
+        add(&mut self.solution, tau, &push);
+        let all = self.solution.joints.iter().chain(&self.solution.object);
+        if !all.fold(0.0, |sum, v| sum + v).is_finite() {
+            return Err(Lost::Diverged);
+        }
+        if self.started {
+            set_velocities(&mut self.motion, &self.solution);
+        }
+        self.power = self.powers(torques_nm, tau);
+        self.report();
+        Ok(())
+    }
+
+    /// Moves on by one sub-step; [`Self::solve`] has to have succeeded.
+    pub fn advance(&mut self) {
+        let (h, v) = (self.substep_s, self.solution);
+        let momentum = self.now.inertia_kg_m2(&self.model) * tail(&v.object);
+        let after = if self.started {
+            self.spin_momentum = 2.0 * momentum - self.spin_momentum;
+            combine(2.0, &v, -1.0, &self.before)
+        } else {
+            self.spin_momentum = momentum;
+            v
+        };
+        let now = velocities(&self.motion);
+        let extrapolated = combine(2.0, &now, -1.0, &self.previous);
+        (self.previous, self.before) = (now, after);
+        // Half a step on either side of the instant; the start has one side only.
+        self.work = self.work.after(&self.power, self.path_s());
+        self.hold_what_sticks();
+
+        let motion = &mut self.motion;
+        for k in 0..self.model.hand.joint_count() {
+            let step = h * self.before.joints[k];
+            motion.angles_rad[k] += step;
+            self.stretch_rad[k] = stretch(&self.model.friction[k], self.stretch_rad[k], step);
+        }
+        motion.position_m += h * head(&self.before.object);
+        let inertia = &self.model.object.inertia_kg_m2;
+        motion.attitude = turn_freely(&motion.attitude, inertia, &self.spin_momentum, h);
+        set_velocities(motion, &extrapolated);
+        self.started = true;
+        self.steps += 1;
+        self.place();
+    }
+
+    /// The time of the path that a step's forces stand for, s.
+    fn path_s(&self) -> f64 {
+        if self.started { self.substep_s } else { 0.5 * self.substep_s }
+    }
+
+    /// Time of this instant, s.
+    fn time_s(&self) -> f64 {
+        self.steps as f64 * self.substep_s
+    }
+
+    fn object_mass(&self) -> ObjectMass {
+        ObjectMass { mass_kg: self.model.object.mass_kg, inertia_kg_m2: self.now.inertia_kg_m2(&self.model) }
+    }
+
+    fn place(&mut self) {
+        let Self { now, model, world, motion, .. } = self;
+        now.place(model, &world.rotor_inertia_kg_m2, &motion.angles_rad, motion.position_m, motion.attitude);
+    }
+
+    /// Adds what acts on joints and object, without contacts; `softness` is what friction adds to the diagonal of the mass
+    /// matrix because it is solved for implicitly.
+    fn external_forces(
+        &mut self,
+        torques_nm: &JointVector,
+        tau: f64,
+        push: &mut Everything,
+        softness: &mut JointVector,
+    ) {
+        let PlantModel { hand, object, hand_gravity_m_s2, object_gravity_m_s2, .. } = &self.model;
+        let t_s = self.time_s();
+        self.gravity_m_s2 = match &self.world.gravity_m_s2 {
+            Some(path) => [path.at(t_s); 2],
+            None => [*hand_gravity_m_s2, *object_gravity_m_s2],
+        };
+        let speeds = &self.motion.speeds_rad_s;
+        let bias = bias_torques(hand, &self.now.bodies, speeds, &self.gravity_m_s2[0]);
+        for (k, friction) in self.model.friction.iter().enumerate() {
+            let friction = torque(friction, self.stretch_rad[k], speeds[k]);
+            self.friction[k] = friction;
+            push.joints[k] =
+                torques_nm[k] - bias[k] - friction.torque_nm - friction.damping_nm_s * self.before.joints[k];
+            softness[k] = tau * (friction.damping_nm_s + tau * friction.stiffness_nm);
+        }
+        self.pushed = [0.0; 6];
+        for push in &self.model.pushes {
+            let share = share(push, t_s - tau, t_s + tau);
+            for (sum, part) in self.pushed.iter_mut().zip(push.force_n.iter().chain(push.moment_nm.iter())) {
+                *sum += share * part;
+            }
+        }
+        push.object = self.pushed;
+        for (force, gravity) in push.object.iter_mut().zip(self.gravity_m_s2[1].iter()) {
+            *force += object.mass_kg * gravity;
+        }
+    }
+
+    /// Collects the contacts that touch or may touch within this step.
+    fn collect(&mut self) {
+        let t_s = self.time_s();
+        let fastest = head(&self.before.object).norm()
+            + tail(&self.before.object).norm() * self.model.object.shape.radius_m();
+        let Self {
+            now,
+            model,
+            world,
+            shape,
+            materials,
+            touches,
+            rates_m_s,
+            before,
+            substep_s,
+            as_rolling,
+            ..
+        } = self;
+        touches.clear();
+        rates_m_s.clear();
+        let far_m = FAR_M + 2.0 * *substep_s * fastest;
+        now.touches((model, world), (shape, materials), t_s, far_m, |touch| {
+            let table_m_s = table_velocity(world, &touch, (t_s - *substep_s, t_s));
+            let gap_m_s = times(&now.row(model, &touch, 0), before) + touch.normal.dot(&table_m_s);
+            if touch.depth_m + 2.0 * *substep_s * gap_m_s.abs() + NEAR > 0.0 {
+                touches.push(touch);
+                rates_m_s.push(-gap_m_s);
+                for sign in [1.0, -1.0].into_iter().filter(|_| *as_rolling) {
+                    if let Some(touch) = touch.viscous_torsion(sign, &model.fingertips) {
+                        rates_m_s.push(-times(&now.row(model, &touch, 0), before));
+                        touches.push(touch);
+                    }
+                }
+            }
+        });
+    }
+
+    /// Sets rows, Delassus matrix and free velocities of the contacts, given whitened forces.
+    fn set_problem(&mut self, tau: f64, push: &Everything) {
+        let (t_s, h) = (self.time_s(), self.substep_s);
+        let around_s = if self.started { (t_s - h, t_s + h) } else { (t_s, t_s + h) };
+        let Self { now, model, world, touches, rows, whitened, mass, problem, before, .. } = self;
+        problem.clear();
+        rows.clear();
+        for touch in touches.iter() {
+            problem.add(touch.tangents(), touch.friction.sliding);
+            rows.extend((0..=touch.tangents()).map(|part| now.row(model, touch, part)));
+        }
+        problem.make_room();
+        let mut r = 0;
+        for touch in touches.iter() {
+            let table_m_s = table_velocity(world, touch, around_s);
+            for part in 0..=touch.tangents() {
+                problem.free[r] = times(&rows[r], before) + touch.along(part, &table_m_s);
+                r += 1;
+            }
+        }
+        whiten_all(mass, rows, whitened);
+        for (free, row) in problem.free.iter_mut().zip(whitened.iter()) {
+            *free += tau * times(row, push);
+        }
+        delassus(whitened, model.hand.joint_count(), tau, problem);
+    }
+
+    /// Powers at this instant, with the velocities that were solved for.
+    fn powers(&self, torques_nm: &JointVector, tau: f64) -> Flows {
+        let mut flows = Flows::NONE;
+        let Self { model, solution, .. } = self;
+        let [hand_gravity, object_gravity] = &self.gravity_m_s2;
+        let weight_nm = model.hand.gravity_torques(&self.now.posture, hand_gravity);
+        for (k, speed) in solution.joints.iter().enumerate().take(model.hand.joint_count()) {
+            // As in `external_forces`, with the part that is implicit.
+            let FrictionTorque { torque_nm, damping_nm_s, stiffness_nm } = self.friction[k];
+            let friction_nm =
+                torque_nm + damping_nm_s * speed + tau * stiffness_nm * (speed - self.before.joints[k]);
+            flows.motors += torques_nm[k] * speed;
+            flows.friction += friction_nm * speed;
+            flows.weight -= weight_nm[k] * speed;
+            flows.joint_speeds_squared[k] = speed * speed;
+        }
+        let Problem { forces, velocities, .. } = &self.problem;
+        let mut r = 0;
+        for (k, touch) in self.touches.iter().enumerate() {
+            let rate = -velocities[r];
+            let law = respond(
+                touch,
+                self.rates_m_s[k],
+                rate,
+                (self.path_s(), tau),
+                (self.started, self.as_rolling),
+            );
+            let damped = (forces[r] - law.elastic_n) * rate;
+            match touch.pair {
+                Pair::JointLimit { .. } => flows.friction += damped,
+                Pair::Torsion { .. } => flows.torsion += damped,
+                _ => flows.indentation += damped,
+            }
+            let table_m_s = self.table_velocity_now(touch);
+            for part in 0..=touch.tangents() {
+                if part > 0 {
+                    flows.slip -= forces[r] * velocities[r];
+                }
+                // The table is the second body: what it takes from it is the negative of the force on it.
+                flows.tables -= forces[r] * touch.along(part, &table_m_s);
+                r += 1;
+            }
+        }
+        let object = &solution.object;
+        flows.pushes = self.pushed.iter().zip(object).map(|(force, speed)| force * speed).sum();
+        flows.weight += model.object.mass_kg * object_gravity.dot(&head(object));
+        flows.velocity_squared = head(object).norm_squared();
+        flows.spin_squared = tail(object).norm_squared();
+        flows
+    }
+
+    fn table_velocity_now(&self, touch: &Touch) -> Vector3<f64> {
+        let (t_s, h) = (self.time_s(), self.substep_s);
+        table_velocity(&self.world, touch, (if self.started { t_s - h } else { t_s }, t_s + h))
+    }
+
+    /// Makes the list of contacts with their forces.
+    fn report(&mut self) {
+        let Self { touches, problem, contacts, .. } = self;
+        contacts.clear();
+        let mut r = 0;
+        for (k, touch) in touches.iter().enumerate() {
+            let mut contact = Contact {
+                touch: *touch,
+                normal_n: problem.forces[r],
+                tangential_n: [0.0; 2],
+                torsion_nm: 0.0,
+                velocity_m_s: [problem.velocities[r], 0.0, 0.0],
+                torsion_rad_s: 0.0,
+                sticks: problem.sticking(k).is_some(),
+            };
+            for part in 1..=touch.tangents() {
+                let (force, velocity) = (problem.forces[r + part], problem.velocities[r + part]);
+                if part < 3 {
+                    contact.tangential_n[part - 1] = force;
+                    contact.velocity_m_s[part] = velocity;
+                } else {
+                    contact.torsion_nm = force * touch.torsion_length_m();
+                    contact.torsion_rad_s = velocity / touch.torsion_length_m();
+                }
+            }
+            contacts.push(contact);
+            r += 1 + touch.tangents();
+        }
+    }
+
+    /// Where a contact begins to stick: projects the velocities of the half step ahead onto no slip of all that stick.
+    fn hold_what_sticks(&mut self) {
+        let begins = self.contacts.iter().any(|c| c.sticks && !self.stuck.contains(&c.touch.pair));
+        self.stuck.clear();
+        self.stuck.extend(self.contacts.iter().filter(|c| c.sticks).map(|c| c.touch.pair));
+        if !begins || self.as_rolling {
+            return;
+        }
+        let (h, t_s) = (self.substep_s, self.time_s());
+        let Self { ahead, model, world, shape, materials, motion, before, spin_momentum, stuck, .. } = self;
+        let mut angles_rad = motion.angles_rad;
+        for (angle, speed) in angles_rad.iter_mut().zip(&before.joints) {
+            *angle += 0.5 * h * speed;
+        }
+        let inertia = &model.object.inertia_kg_m2;
+        let attitude = turn_freely(&motion.attitude, inertia, spin_momentum, 0.5 * h);
+        let position_m = motion.position_m + 0.5 * h * head(&before.object);
+        ahead.place(model, &world.rotor_inertia_kg_m2, &angles_rad, position_m, attitude);
+        let inertia_kg_m2 = ahead.inertia_kg_m2(model);
+        let mut half = *before;
+        set_tail(&mut half.object, &solve_inertia(&inertia_kg_m2, spin_momentum));
+
+        let Self { touches, rows, whitened, mass, problem, projection, .. } = self;
+        touches.clear();
+        ahead.touches((model, world), (shape, materials), t_s + 0.5 * h, f64::INFINITY, |touch| {
+            if stuck.contains(&touch.pair) {
+                touches.push(touch);
+            }
+        });
+        rows.clear();
+        projection.clear();
+        for touch in touches.iter() {
+            for part in 1..=touch.tangents() {
+                projection.add(0, 0.0);
+                rows.push(ahead.row(model, touch, part));
+            }
+        }
+        projection.make_room();
+        let mut r = 0;
+        for touch in touches.iter() {
+            let table_m_s = table_velocity(world, touch, (t_s, t_s + h));
+            for part in 1..=touch.tangents() {
+                projection.velocities[r] = touch.along(part, &table_m_s);
+                projection.free[r] = times(&rows[r], &half) + projection.velocities[r];
+                r += 1;
+            }
+        }
+        let object = ObjectMass { mass_kg: model.object.mass_kg, inertia_kg_m2 };
+        if !(mass.factorize(&ahead.mass, &[0.0; MAX_JOINTS], &object) > LEAST_PIVOT) {
+            return;
+        }
+        whiten_all(mass, rows, whitened);
+        delassus(whitened, model.hand.joint_count(), 1.0, projection);
+        let Some(lost_j) = projection.project() else { return };
+        problem.counters.projections += 1;
+        let mut change = Everything::ZERO;
+        for (row, impulse) in whitened.iter().zip(&projection.forces) {
+            add(&mut change, *impulse, row);
+        }
+        mass.unwhiten(&mut change);
+        add(before, 1.0, &change);
+        *spin_momentum += inertia_kg_m2 * tail(&change.object);
+        self.work.slip += lost_j;
+        let tables: f64 = projection.forces.iter().zip(&projection.velocities).map(|(l, v)| l * v).sum();
+        self.work.tables -= tables;
+    }
+}
+
+/// The law of a contact's normal force.
+fn respond(
+    touch: &Touch,
+    before_m_s: f64,
+    rate_m_s: f64,
+    (path_s, tau): (f64, f64),
+    (started, as_rolling): (bool, bool),
+) -> Response {
+    let material = &touch.material;
+    if let Pair::Torsion { .. } = touch.pair {
+        let viscosity = material.damping[0];
+        return Response { force_n: viscosity * rate_m_s, slope_n_s_m: viscosity, elastic_n: 0.0 };
+    }
+    if as_rolling {
+        return material.frozen(touch.depth_m, before_m_s, rate_m_s, tau);
+    }
+    let from_m = if started { touch.depth_m - tau * before_m_s } else { touch.depth_m };
+    material.average(from_m, rate_m_s, path_s)
+}
+
+/// Mean velocity of a contact's table between two times, m/s; zero where there is none.
+fn table_velocity(world: &World, touch: &Touch, (from_s, to_s): (f64, f64)) -> Vector3<f64> {
+    touch.pair.table().map_or_else(Vector3::zeros, |table| {
+        let point_m = &world.tables[table].point_m;
+        (point_m.at(to_s) - point_m.at(from_s)) / (to_s - from_s)
+    })
+}
+
+/// `L^-1 J^T` of all rows.
+fn whiten_all(mass: &MassFactor, rows: &[Everything], whitened: &mut Vec<Everything>) {
+    whitened.clear();
+    whitened.extend_from_slice(rows);
+    for row in whitened {
+        mass.whiten(row);
+    }
+}
+
+/// `tau J M^-1 J^T`.
+fn delassus(whitened: &[Everything], joints: usize, tau: f64, problem: &mut Problem) {
+    let n = whitened.len();
+    for (r, a) in whitened.iter().enumerate() {
+        for (s, b) in whitened.iter().enumerate().take(r + 1) {
+            let entry = tau * (dot(&a.joints, &b.joints, joints) + dot(&a.object, &b.object, 6));
+            problem.delassus[r * n + s] = entry;
+            problem.delassus[s * n + r] = entry;
+        }
+    }
+}
+
+/// The material of the object's corners on a table: as stiff as the step resolves, with damping by the object's mass.
+///
+/// It is one for all corners and the whole run, so that their energy is a potential: `n` corners of a face at once, each with
+/// `h^2 k n (J M^-1 J^T) <= 1` in any direction, stay within what the leapfrog resolves.
+fn corner(model: &PlantModel, step_s: f64) -> Material {
+    let object = &model.object;
+    let corners = object.shape.faces.iter().map(|face| face.corners.len()).max().unwrap_or(1) as f64;
+    let inverse = object.inertia_kg_m2.try_inverse().unwrap_or_default();
+    let yields = |vertex_m: &Vector3<f64>| {
+        let lever = vertex_m.cross_matrix();
+        // The trace is above the largest eigenvalue.
+        1.0 / object.mass_kg + (lever * inverse * lever.transpose()).trace()
+    };
+    let most = object.shape.vertices_m.iter().map(yields).fold(0.0, f64::max);
+    let stiffness_n_m = CORNER_N_M.min(1.0 / (corners * step_s * step_s * most));
+    let critical_n_s_m = 2.0 * (stiffness_n_m * object.mass_kg / corners).square_root();
+    Material::spring(stiffness_n_m, DAMPING * critical_n_s_m)
+}
+
+/// The materials of the ends of the joints' ranges, by the joints' inertia at the start.
+fn limits(mass: &MassFactor, joints: usize, step_s: f64) -> Vec<Material> {
+    let limit = |joint: usize| {
+        let mut row = Everything::ZERO;
+        row.joints[joint] = 1.0;
+        mass.whiten(&mut row);
+        let inertia_kg_m2 = 1.0 / times(&row, &row);
+        // A quarter, since the inertia changes with the posture.
+        let stiffness_nm = LIMIT_NM.min(0.25 * inertia_kg_m2 / (step_s * step_s));
+        Material::spring(stiffness_nm, DAMPING * 2.0 * (stiffness_nm * inertia_kg_m2).square_root())
+    };
+    (0..joints).map(limit).collect()
+}
+
+/// Velocities of a motion.
+fn velocities(motion: &Motion) -> Everything {
+    let (v, w) = (&motion.velocity_m_s, &motion.spin_rad_s);
+    Everything { joints: motion.speeds_rad_s, object: [v.x, v.y, v.z, w.x, w.y, w.z] }
+}
+
+fn set_velocities(motion: &mut Motion, v: &Everything) {
+    motion.speeds_rad_s = v.joints;
+    motion.velocity_m_s = head(&v.object);
+    motion.spin_rad_s = tail(&v.object);
+}
+
+/// `a u + b v`.
+fn combine(a: f64, u: &Everything, b: f64, v: &Everything) -> Everything {
+    let mut sum = Everything::ZERO;
+    add(&mut sum, a, u);
+    add(&mut sum, b, v);
+    sum
+}
+
+/// Adds `a v`.
+fn add(sum: &mut Everything, a: f64, v: &Everything) {
+    for (sum, v) in sum.joints.iter_mut().chain(&mut sum.object).zip(v.joints.iter().chain(&v.object)) {
+        *sum += a * v;
+    }
+}
+
+/// Product of a row with velocities; or, once both are whitened, with forces.
+fn times(row: &Everything, v: &Everything) -> f64 {
+    dot(&row.joints, &v.joints, MAX_JOINTS) + dot(&row.object, &v.object, 6)
+}
+
+fn head(v: &[f64; 6]) -> Vector3<f64> {
+    Vector3::new(v[0], v[1], v[2])
+}
+
+fn tail(v: &[f64; 6]) -> Vector3<f64> {
+    Vector3::new(v[3], v[4], v[5])
+}
+
+fn set_tail(v: &mut [f64; 6], w: &Vector3<f64>) {
+    v[3..].copy_from_slice(w.as_slice());
+}

@@ -1,0 +1,282 @@
+//! Places where two bodies may touch, and the rows that take the velocities of hand and object to what a contact feels:
+//! the rate of the gap, slip, and torsion.
+//!
+//! The normal points from the first body to the second. Slip is the difference of the velocities of the two bodies' material
+//! points at the contact: Eq. 10 on a face. All corners of an object on a table are taken on the table's own plane.
+
+use super::material::Material;
+use super::world::{Friction, World};
+use crate::mass::Everything;
+use crate::model::PlantModel;
+use blindgrasp_body::dynamics::{Body, JointMatrix, JointVector, mass_matrix, place_bodies};
+use blindgrasp_body::polyhedron::Convex;
+use blindgrasp_body::{FingertipModel, MAX_JOINTS, Posture};
+use blindgrasp_shared::hand::LinkPose;
+use nalgebra::{Matrix3, UnitQuaternion, Vector3};
+
+/// The two bodies of a contact, the first one first.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Pair {
+    /// A fingertip and the object.
+    FingertipObject {
+        /// The finger.
+        finger: usize,
+    },
+    /// A fingertip and a table.
+    FingertipTable {
+        /// The finger.
+        finger: usize,
+        /// The table.
+        table: usize,
+    },
+    /// A corner of the object and a table.
+    ObjectTable {
+        /// Index of the vertex.
+        corner: usize,
+        /// The table.
+        table: usize,
+    },
+    /// A fingertip and the object: the viscous torsion of the rolling contact, one way round.
+    #[doc(hidden)]
+    Torsion {
+        /// The finger.
+        finger: usize,
+    },
+    /// A joint and the end of its range.
+    JointLimit {
+        /// The joint.
+        joint: usize,
+        /// The upper end.
+        is_upper: bool,
+    },
+}
+
+impl Pair {
+    pub(super) fn table(self) -> Option<usize> {
+        match self {
+            Self::FingertipTable { table, .. } | Self::ObjectTable { table, .. } => Some(table),
+            _ => None,
+        }
+    }
+}
+
+/// Two bodies that touch or nearly touch.
+#[derive(Clone, Copy, Debug)]
+pub struct Touch {
+    /// The bodies.
+    pub pair: Pair,
+    /// Place of the contact, m.
+    pub point_m: Vector3<f64>,
+    /// Unit vector from the first body to the second.
+    pub normal: Vector3<f64>,
+    /// Unit vectors across it.
+    pub tangents: [Vector3<f64>; 2],
+    /// Depth, m; negative where there is a gap. For the end of a joint's range, rad.
+    pub depth_m: f64,
+    /// Friction.
+    pub friction: Friction,
+    /// Material.
+    pub(super) material: Material,
+}
+
+impl Touch {
+    fn new(pair: Pair, point_m: Vector3<f64>, normal: Vector3<f64>) -> Self {
+        let helper = if normal.x.abs() < 0.6 { Vector3::x() } else { Vector3::y() };
+        let first = helper.cross(&normal).normalize();
+        let tangents = [first, normal.cross(&first)];
+        let (friction, material) = Default::default();
+        Self { pair, point_m, normal, tangents, depth_m: 0.0, friction, material }
+    }
+
+    /// The number of tangential rows: none without friction, a third one with torsion.
+    pub(super) fn tangents(&self) -> usize {
+        match self.friction {
+            Friction { sliding, .. } if !(sliding > 0.0) => 0,
+            Friction { torsion_m, .. } if !(torsion_m > 0.0) => 2,
+            Friction { .. } => 3,
+        }
+    }
+
+    /// The part of a velocity of the second body that a row feels.
+    pub(super) fn along(&self, part: usize, velocity_m_s: &Vector3<f64>) -> f64 {
+        match part {
+            0 => self.normal.dot(velocity_m_s),
+            1 | 2 => self.tangents[part - 1].dot(velocity_m_s),
+            _ => 0.0,
+        }
+    }
+
+    /// The torsion of a fingertip against the object as the rolling contact has it, one way round.
+    pub(super) fn viscous_torsion(&self, sign: f64, fingertips: &[FingertipModel]) -> Option<Self> {
+        let Pair::FingertipObject { finger } = self.pair else { return None };
+        let tip = &fingertips[finger];
+        let pressed_m = self.depth_m.max(0.0);
+        let area_m2 = std::f64::consts::PI * (2.0 * tip.radius_m - pressed_m).max(0.0) * pressed_m;
+        let material = Material { damping: [tip.torsion_n_s_m * area_m2, 0.0, 0.0], ..Material::default() };
+        let friction = Friction::default();
+        Some(Self { pair: Pair::Torsion { finger }, normal: self.normal * sign, friction, material, ..*self })
+    }
+
+    /// Scale of the torsional row, m: it makes the limits of all three tangential forces one ball.
+    pub(super) fn torsion_length_m(&self) -> f64 {
+        self.friction.torsion_m / self.friction.sliding
+    }
+}
+
+/// Materials, prepared once.
+#[derive(Clone, Debug)]
+pub(super) struct Materials {
+    pub(super) fingertips: Vec<Material>,
+    pub(super) corner: Material,
+    pub(super) limits: Vec<Material>,
+}
+
+/// Positions of everything at one instant, and what follows from them.
+#[derive(Clone, Debug)]
+pub(super) struct Placed {
+    pub(super) angles_rad: JointVector,
+    pub(super) position_m: Vector3<f64>,
+    pub(super) attitude: UnitQuaternion<f64>,
+    turned: Matrix3<f64>,
+    pub(super) posture: Posture,
+    links: [LinkPose<f64>; MAX_JOINTS],
+    pub(super) bodies: [Body; MAX_JOINTS],
+    pub(super) mass: JointMatrix,
+}
+
+impl Placed {
+    pub(super) fn new() -> Self {
+        Self {
+            angles_rad: [0.0; MAX_JOINTS],
+            position_m: Vector3::zeros(),
+            attitude: UnitQuaternion::identity(),
+            turned: Matrix3::identity(),
+            posture: Posture::at_base(),
+            links: [LinkPose { origin_m: Vector3::zeros(), attitude: Matrix3::identity() }; MAX_JOINTS],
+            bodies: [Body::NONE; MAX_JOINTS],
+            mass: [[0.0; MAX_JOINTS]; MAX_JOINTS],
+        }
+    }
+
+    /// Places everything.
+    pub(super) fn place(
+        &mut self,
+        model: &PlantModel,
+        rotors_kg_m2: &[f64],
+        angles_rad: &JointVector,
+        position_m: Vector3<f64>,
+        attitude: UnitQuaternion<f64>,
+    ) {
+        let hand = &model.hand;
+        (self.angles_rad, self.position_m, self.attitude) = (*angles_rad, position_m, attitude);
+        self.turned = attitude.to_rotation_matrix().into_inner();
+        hand.forward_kinematics(angles_rad, &mut self.posture);
+        for k in 0..hand.joint_count() {
+            self.links[k] = self.posture.link(k);
+        }
+        place_bodies(hand, &self.posture, &mut self.bodies);
+        mass_matrix(hand, &self.bodies, &mut self.mass);
+        for (k, rotor) in rotors_kg_m2.iter().enumerate() {
+            self.mass[k][k] += rotor;
+        }
+    }
+
+    /// The object's inertia about its mass centre in base axes, kg m^2.
+    pub(super) fn inertia_kg_m2(&self, model: &PlantModel) -> Matrix3<f64> {
+        self.turned * model.object.inertia_kg_m2 * self.turned.transpose()
+    }
+
+    /// Gives every pair of bodies closer than a distance, with the tables at a time.
+    pub(super) fn touches(
+        &self,
+        (model, world): (&PlantModel, &World),
+        (shape, materials): (&Convex, &Materials),
+        t_s: f64,
+        within_m: f64,
+        mut see: impl FnMut(Touch),
+    ) {
+        let mut near = |depth_m: f64, touch: &dyn Fn() -> Touch| {
+            if depth_m > -within_m {
+                see(Touch { depth_m, ..touch() });
+            }
+        };
+        let hand = &model.hand;
+        for (finger, material) in materials.fingertips.iter().enumerate() {
+            let (centre_m, radius_m) = (self.posture.centres_m[finger], model.fingertips[finger].radius_m);
+            let closest = shape.closest(&self.turned.tr_mul(&(centre_m - self.position_m)));
+            let point_m = self.position_m + self.turned * closest.point_m;
+            let pair = Pair::FingertipObject { finger };
+            near(radius_m - closest.distance_m, &|| Touch {
+                friction: world.fingertip_friction[finger],
+                material: *material,
+                ..Touch::new(pair, point_m, -(self.turned * closest.normal))
+            });
+        }
+        for (t, table) in world.tables.iter().enumerate() {
+            let origin_m = table.point_m.at(t_s);
+            for (finger, material) in materials.fingertips.iter().enumerate() {
+                let centre_m = self.posture.centres_m[finger];
+                let height_m = table.normal.dot(&(centre_m - origin_m));
+                let pair = Pair::FingertipTable { finger, table: t };
+                near(model.fingertips[finger].radius_m - height_m, &|| Touch {
+                    friction: table.fingertip_friction,
+                    material: *material,
+                    ..Touch::new(pair, centre_m - table.normal * height_m, -table.normal)
+                });
+            }
+            for (corner, vertex_m) in model.object.shape.vertices_m.iter().enumerate() {
+                let corner_m = self.position_m + self.turned * vertex_m;
+                let height_m = table.normal.dot(&(corner_m - origin_m));
+                let pair = Pair::ObjectTable { corner, table: t };
+                near(-height_m, &|| Touch {
+                    friction: Friction { sliding: table.object_friction, torsion_m: 0.0 },
+                    material: materials.corner,
+                    ..Touch::new(pair, corner_m - table.normal * height_m, -table.normal)
+                });
+            }
+        }
+        for (joint, material) in materials.limits.iter().enumerate() {
+            let (lower_rad, upper_rad) = hand.range_rad(joint);
+            let angle_rad = self.angles_rad[joint];
+            let is_upper = angle_rad > 0.5 * (lower_rad + upper_rad);
+            near(if is_upper { angle_rad - upper_rad } else { lower_rad - angle_rad }, &|| Touch {
+                material: *material,
+                ..Touch::new(Pair::JointLimit { joint, is_upper }, Vector3::zeros(), Vector3::z())
+            });
+        }
+    }
+
+    /// Row `part` of a contact: 0 is the rate of its gap, 1 and 2 slip along its tangents, 3 its torsion.
+    pub(super) fn row(&self, model: &PlantModel, touch: &Touch, part: usize) -> Everything {
+        let mut row = Everything::ZERO;
+        let (first, second) = match touch.pair {
+            Pair::JointLimit { joint, is_upper } => {
+                row.joints[joint] = if is_upper { -1.0 } else { 1.0 };
+                return row;
+            }
+            Pair::FingertipObject { finger } | Pair::Torsion { finger } => (Some(finger), 1.0),
+            Pair::FingertipTable { finger, .. } => (Some(finger), 0.0),
+            Pair::ObjectTable { .. } => (None, -1.0),
+        };
+        let (linear, angular) = match part {
+            0 if matches!(touch.pair, Pair::Torsion { .. }) => (Vector3::zeros(), Some(touch.normal)),
+            0 => (touch.normal, None),
+            1 | 2 => (touch.tangents[part - 1], None),
+            _ => (Vector3::zeros(), Some(touch.normal * touch.torsion_length_m())),
+        };
+        if second != 0.0 {
+            let turning = angular.unwrap_or_else(|| (touch.point_m - self.position_m).cross(&linear));
+            let entries = linear.iter().chain(turning.iter());
+            for (entry, value) in row.object.iter_mut().zip(entries) {
+                *entry = second * value;
+            }
+        }
+        for k in first.into_iter().flat_map(|finger| model.hand.joints_to(finger)) {
+            let axis = self.links[k].axis();
+            let lever_m = touch.point_m - self.links[k].origin_m;
+            row.joints[k] =
+                -angular.map_or_else(|| linear.dot(&axis.cross(&lever_m)), |angular| angular.dot(&axis));
+        }
+        row
+    }
+}
