@@ -1,6 +1,7 @@
 //! Physics against closed forms, conservation laws and itself at other steps.
 
 mod grasps;
+mod order;
 mod tables;
 
 use super::*;

@@ -5,7 +5,7 @@ use super::*;
 const SIDE_M: f64 = 0.048;
 const MASS_KG: f64 = 0.045;
 
-fn cube(mass_kg: f64) -> ObjectModel {
+pub(super) fn cube(mass_kg: f64) -> ObjectModel {
     object(Polyhedron::cuboid([SIDE_M; 3]).unwrap(), mass_kg)
 }
 
