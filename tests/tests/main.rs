@@ -3,6 +3,7 @@
 mod architecture;
 mod constraints;
 mod control;
+mod coulomb;
 mod documents;
 mod dynamics;
 mod earlier_law;

@@ -27,11 +27,9 @@ const PROXIMAL: f64 = 1e-8;
 const LINEARIZATIONS: usize = 12;
 /// Changes of the set of pressed contacts while all stick.
 const SETS: usize = 8;
-/// Sweeps of Gauss-Seidel before Newton's method.
-const SWEEPS: usize = 3;
+/// Sweeps of Gauss-Seidel before Newton's method; and where that fails, before it is tried again.
+const SWEEPS: [usize; 5] = [3, 10, 30, 100, 300];
 const NEWTON_STEPS: usize = 15;
-/// Sweeps of Gauss-Seidel where Newton's method fails.
-const FALLBACK_SWEEPS: usize = 500;
 /// Error of forces, relative to the largest.
 const TOLERANCE: f64 = 1e-10;
 
@@ -289,40 +287,36 @@ impl Problem {
             let radius = place.radius(&self.forces);
             into_ball(&mut self.forces[place.tangential()], radius);
         }
-        for _ in 0..SWEEPS {
-            self.sweep();
+        for (round, sweeps) in SWEEPS.into_iter().enumerate() {
+            for _ in 0..sweeps {
+                self.counters.fallback_sweeps += u64::from(round > 0);
+                self.sweep();
+            }
+            // Where Newton's method fails, Gauss-Seidel goes on from where it was.
+            self.right.copy_from_slice(&self.forces);
+            if self.newton() {
+                return;
+            }
+            self.forces.copy_from_slice(&self.right);
         }
+        self.update_velocities();
+        self.counters.unconverged += 1;
+    }
+
+    /// Newton's method. Returns `true` if it converged.
+    fn newton(&mut self) -> bool {
         for _ in 0..NEWTON_STEPS {
             self.update_velocities();
             if self.error() <= TOLERANCE {
-                return;
+                return true;
             }
             self.counters.newton_steps += 1;
             if !self.newton_step() {
-                break;
+                return false;
             }
         }
         self.update_velocities();
-        if self.error() <= TOLERANCE {
-            return;
-        }
-        if !self.forces.iter().all(|force| force.is_finite()) {
-            self.forces.fill(0.0);
-        }
-        for place in &self.places {
-            self.forces[place.normal] = self.forces[place.normal].max(0.0);
-            let radius = place.radius(&self.forces);
-            into_ball(&mut self.forces[place.tangential()], radius);
-        }
-        for _ in 0..FALLBACK_SWEEPS {
-            self.counters.fallback_sweeps += 1;
-            self.sweep();
-            self.update_velocities();
-            if self.error() <= TOLERANCE {
-                return;
-            }
-        }
-        self.counters.unconverged += 1;
+        self.error() <= TOLERANCE
     }
 
     /// Returns the loss of energy, J, when impulses take all velocities away; `forces` are these impulses. `None` if there is
@@ -491,6 +485,11 @@ impl Problem {
                     + dot(&row[all.end..], &self.forces[all.end..]);
                 own[i][..all.len()].copy_from_slice(&row[all.clone()]);
             }
+            // The proximal term draws to the forces before, so that nothing of it is left in the end.
+            for (i, r) in place.tangential().enumerate() {
+                own[i + 1][i + 1] += place.proximal;
+                free[i + 1] -= place.proximal * self.forces[r];
+            }
             let forces = one_contact(&place, &own, &free);
             self.forces[all.clone()].copy_from_slice(&forces[..all.len()]);
         }
@@ -522,43 +521,35 @@ fn one_contact(place: &Place, own: &[[f64; 4]; 4], free: &[f64; 4]) -> [f64; 4] 
         }
         right[i] = -(free[i + 1] + own[i + 1][0] * alpha);
     }
-    for i in 0..place.tangents {
-        s[(i, i)] += place.proximal;
-    }
-    // (S + kappa) l_t = right, with the least kappa for which l_t is in its ball.
+    // (S + kappa) l_t = right, with the least kappa for which l_t is in its ball: the secular equation of trust regions,
+    // 1 / |l_t| - 1 / radius = 0, which is nearly linear in kappa.
     let solve = |kappa: f64| {
-        let mut matrix = s;
-        for i in 0..3 {
-            matrix[(i, i)] += kappa;
-        }
-        let inverse = matrix.try_inverse().unwrap_or_default();
+        let inverse = (s + Matrix3::from_diagonal_element(kappa)).try_inverse().unwrap_or_default();
         let tangential = inverse * right;
-        let change = -(inverse * tangential);
-        let excess = tangential.norm() - place.friction * (alpha - beta.dot(&tangential));
-        let slope = tangential.dot(&change) / tangential.norm().max(f64::MIN_POSITIVE)
-            + place.friction * beta.dot(&change);
-        (tangential, excess, slope)
+        let radius = place.friction * (alpha - beta.dot(&tangential));
+        let squared = tangential.norm_squared();
+        let excess = squared.square_root() - radius;
+        let step = squared / tangential.dot(&(inverse * tangential)) * excess / radius;
+        (tangential, excess, if radius > 0.0 { kappa + step } else { f64::NAN })
     };
-    let (mut tangential, mut excess, mut slope) = solve(0.0);
+    let (mut tangential, mut excess, mut next) = solve(0.0);
     if excess > 0.0 {
         let (mut low, mut high, mut kappa) = (0.0, f64::INFINITY, 0.0);
-        let size = s.trace();
-        for _ in 0..60 {
-            let newton = kappa - excess / slope;
-            kappa = if newton > low && newton < high {
-                newton
+        for _ in 0..100 {
+            kappa = if next > low && next < high {
+                next
             } else if high.is_finite() {
                 0.5 * (low + high)
             } else {
-                2.0 * kappa + size
+                4.0 * kappa + s.trace()
             };
-            (tangential, excess, slope) = solve(kappa);
+            (tangential, excess, next) = solve(kappa);
             if excess > 0.0 {
                 low = kappa
             } else {
                 high = kappa
             }
-            if excess.abs() <= 1e-15 * place.friction * alpha || high - low <= 1e-15 * high {
+            if excess.abs() <= 1e-14 * place.friction * alpha || high - low <= 1e-15 * high {
                 break;
             }
         }

@@ -2,6 +2,7 @@
 
 mod grasps;
 mod order;
+mod robustness;
 mod tables;
 
 use super::*;
@@ -90,19 +91,23 @@ fn at(position_m: Vector3<f64>) -> Motion {
 }
 
 impl Plant {
-    /// Kinetic and elastic energy at the half step before this instant, of which the integrator's balance is exact: that of
-    /// the object, without joints.
+    /// Kinetic and elastic energy at the half step before this instant, of which the integrator's balance is exact. Joints have
+    /// to be alone on their branches: then their inertia does not change.
     fn half_step_energy_j(&self) -> f64 {
-        let v = Vector3::from_column_slice(&self.before.object[..3]);
+        let v = head(&self.before.object);
         let inertia = self.now.inertia_kg_m2(&self.model);
-        let spin = crate::rotation::solve_inertia(&inertia, &self.spin_momentum);
+        let spin = solve_inertia(&inertia, &self.spin_momentum);
+        let joints: f64 = (0..self.model.hand.joint_count())
+            .map(|k| self.now.mass[k][k] * self.before.joints[k] * self.before.joints[k])
+            .sum();
         let elastic: f64 = self
             .touches
             .iter()
             .zip(&self.rates_m_s)
             .map(|(touch, rate)| touch.material.energy_j(touch.depth_m - 0.5 * self.substep_s * rate))
             .sum();
-        0.5 * (self.model.object.mass_kg * v.norm_squared() + spin.dot(&self.spin_momentum)) + elastic
+        let object = self.model.object.mass_kg * v.norm_squared() + spin.dot(&self.spin_momentum);
+        0.5 * (object + joints) + elastic
     }
 
     /// Moves on by a time under constant torques.
