@@ -42,50 +42,15 @@ const BENCH: Duration = Duration::from_secs(120);
 /// The reason for which there is no emulated firmware.
 #[derive(Debug, thiserror::Error)]
 pub enum QemuError {
-    /// It is not installed.
-    #[error("{} is not installed, or not in PATH: `apt-get install qemu-system-arm` on Debian, `brew install qemu` on macOS; or use a real board with --port", .0.display())]
-    Missing(PathBuf),
     /// It could not be started.
-    #[error("cannot start {}", .program.display())]
-    Start {
-        /// The program.
-        program: PathBuf,
-        /// The cause.
-        source: io::Error,
-    },
-    /// The image can't be read, or is none.
-    #[error("{}: {reason}", .path.display())]
-    Image {
-        /// Its path.
-        path: PathBuf,
-        /// The cause.
-        reason: String,
-    },
+    #[error("cannot start {}", .0.display())]
+    Start(PathBuf, #[source] io::Error),
     /// Its folder, pipes or socket could not be made or opened.
     #[error("cannot make or open the pipes to QEMU in {}", std::env::temp_dir().display())]
     Pipes(#[from] io::Error),
-    /// It ended.
+    /// It is not installed, the image is none, or the firmware does not do what it should.
     #[error("{0}")]
-    Ended(String),
-    /// The firmware does not come up.
-    #[error("the firmware did not start within {} s; {said}", .waited.as_secs_f64())]
-    TimedOut {
-        /// Time that it was waited for.
-        waited: Duration,
-        /// The output of QEMU.
-        said: String,
-    },
-    /// The user wanted an end.
-    #[error("interrupted")]
-    Interrupted,
-    /// The figures of the benchmark are not as expected.
-    #[error("the firmware's figures can't be read: {reason}; {said}")]
-    Figures {
-        /// The cause.
-        reason: String,
-        /// The output of QEMU.
-        said: String,
-    },
+    Failed(String),
 }
 
 /// The way to run an image.
@@ -104,7 +69,7 @@ impl Qemu {
     /// # Errors
     /// If the file is no such image.
     pub fn new(image: &Path, patience: Duration) -> Result<Self, QemuError> {
-        let fail = |reason: String| Err(QemuError::Image { path: image.to_owned(), reason });
+        let fail = |reason: String| Err(QemuError::Failed(format!("{}: {reason}", image.display())));
         let bytes = match files::read(image) {
             Ok(bytes) => bytes,
             Err(error) => return fail(error.to_string()),
@@ -178,9 +143,12 @@ impl Qemu {
         let status = process.wait_for_end(BENCH)?;
         let printed = process.stdout.text();
         if !status.success() {
-            return Err(QemuError::Ended(process.said_at_end(status)));
+            return Err(QemuError::Failed(process.said_at_end(status)));
         }
-        let fail = |reason: String| Err(QemuError::Figures { reason, said: process.said() });
+        let fail = |reason: String| {
+            let said = process.said();
+            Err(QemuError::Failed(format!("the firmware's figures can't be read: {reason}; {said}")))
+        };
         let figures: serde_json::Map<_, _> = match serde_json::from_str(printed.trim()) {
             Ok(figures) => figures,
             Err(error) => return fail(error.to_string()),
@@ -211,8 +179,12 @@ impl Qemu {
         command.current_dir(&folder.0).process_group(0);
         command.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped());
         let mut child = command.spawn().map_err(|source| match source.kind() {
-            io::ErrorKind::NotFound => QemuError::Missing(self.program.clone()),
-            _ => QemuError::Start { program: self.program.clone(), source },
+            io::ErrorKind::NotFound => QemuError::Failed(format!(
+                "{} is not installed, or not in PATH: `apt-get install qemu-system-arm` on Debian, `brew install qemu` on macOS; \
+                 or use a real board with --port",
+                self.program.display()
+            )),
+            _ => QemuError::Start(self.program.clone(), source),
         })?;
         let stdout = Tail::of(child.stdout.take());
         let stderr = Tail::of(child.stderr.take());
@@ -295,13 +267,13 @@ impl Process {
                 return Ok(found);
             }
             if let Some(status) = self.child.try_wait()? {
-                return Err(QemuError::Ended(self.said_at_end(status)));
+                return Err(QemuError::Failed(self.said_at_end(status)));
             }
             if interrupt::wanted() {
-                return Err(QemuError::Interrupted);
+                return Err(QemuError::Failed("interrupted".to_owned()));
             }
             if Instant::now() >= deadline {
-                return Err(QemuError::TimedOut { waited: patience, said: self.said() });
+                return Err(self.timed_out(patience));
             }
             thread::sleep(LOOK);
         }
@@ -315,10 +287,10 @@ impl Process {
                 return Ok(status);
             }
             if interrupt::wanted() {
-                return Err(QemuError::Interrupted);
+                return Err(QemuError::Failed("interrupted".to_owned()));
             }
             if Instant::now() >= deadline {
-                return Err(QemuError::TimedOut { waited: patience, said: self.said() });
+                return Err(self.timed_out(patience));
             }
             thread::sleep(LOOK);
         }
@@ -339,6 +311,11 @@ impl Process {
 
     fn said(&self) -> String {
         format!("QEMU still runs{}", self.printed())
+    }
+
+    fn timed_out(&self, patience: Duration) -> QemuError {
+        let waited_s = patience.as_secs_f64();
+        QemuError::Failed(format!("the firmware did not start within {waited_s} s; {}", self.said()))
     }
 
     /// The end of what it printed.

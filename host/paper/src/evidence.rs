@@ -1,10 +1,11 @@
 //! The runs, done: on all cores, in the order of the plan.
 
 use super::plan::Planned;
-use blindgrasp_model::{Scene, SceneError};
+use blindgrasp_model::Scene;
 use blindgrasp_sim::summary::Summary;
-use blindgrasp_sim::{Run, Simulation, SimulationError};
+use blindgrasp_sim::{Run, Simulation};
 use rayon::prelude::*;
+use std::fmt::Display;
 use std::num::NonZeroU64;
 
 /// Time between samples, s: that of the experiments' servo loop.
@@ -13,37 +14,14 @@ const SAMPLE_S: f64 = 1e-3;
 /// The reason for which a run of the plan can't be done. Its scenes are built in, so that this is a fault of the
 /// program.
 #[derive(Debug, thiserror::Error)]
-pub enum EvidenceError {
-    /// The scene.
-    #[error("run `{run}`: {cause}")]
-    Scene {
-        /// The run.
-        run: String,
-        /// The error in its scene.
-        cause: SceneError,
-    },
-    /// The simulation.
-    #[error("run `{run}`: {cause}")]
-    Simulation {
-        /// The run.
-        run: String,
-        /// The error in its model or gains.
-        cause: SimulationError,
-    },
-    /// A sweep.
-    #[error("sweep `{sweep}`: {cause}")]
-    Sweep {
-        /// The sweep.
-        sweep: &'static str,
-        /// The error.
-        cause: String,
-    },
-    /// An object that the search finds no grasp for.
-    #[error("run `{0}`: the search finds no grasp for its object")]
-    NoGrasp(String),
-    /// A name that no run has.
-    #[error("no run is called `{0}`")]
-    Missing(String),
+#[error("{0}")]
+pub struct EvidenceError(pub String);
+
+impl EvidenceError {
+    /// What is wrong with a run.
+    pub fn of(run: &str, cause: impl Display) -> Self {
+        Self(format!("run `{run}`: {cause}"))
+    }
 }
 
 /// A run that was done.
@@ -73,7 +51,7 @@ impl Done {
 /// # Errors
 /// What is wrong with them.
 pub fn scene(run: &str, name: &str, settings: &[String]) -> Result<Scene, EvidenceError> {
-    Scene::load(name, settings).map_err(|cause| EvidenceError::Scene { run: run.to_owned(), cause })
+    Scene::load(name, settings).map_err(|cause| EvidenceError::of(run, cause))
 }
 
 /// A simulation that keeps a sample a millisecond, whatever the period of its controller.
@@ -81,8 +59,7 @@ pub fn scene(run: &str, name: &str, settings: &[String]) -> Result<Scene, Eviden
 /// # Errors
 /// What is wrong with the scene's model or gains.
 pub fn simulation(run: &str, scene: &Scene) -> Result<Simulation, EvidenceError> {
-    let cause = |cause| EvidenceError::Simulation { run: run.to_owned(), cause };
-    let mut simulation = Simulation::new(scene).map_err(cause)?;
+    let mut simulation = Simulation::new(scene).map_err(|cause| EvidenceError::of(run, cause))?;
     let ticks = (SAMPLE_S / scene.control.period_s).round().max(1.0) as u64;
     simulation.sample_every(NonZeroU64::new(ticks).unwrap_or(NonZeroU64::MIN));
     Ok(simulation)
@@ -125,6 +102,9 @@ impl Evidence {
     /// # Errors
     /// There is none of that name.
     pub fn run(&self, name: &str) -> Result<&Done, EvidenceError> {
-        self.runs.iter().find(|done| done.name == name).ok_or_else(|| EvidenceError::Missing(name.to_owned()))
+        self.runs
+            .iter()
+            .find(|done| done.name == name)
+            .ok_or_else(|| EvidenceError(format!("no run is called `{name}`")))
     }
 }

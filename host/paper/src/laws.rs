@@ -148,5 +148,5 @@ impl Grasped {
 /// # Errors
 /// What is wrong with it.
 pub fn built(run: &str, file: SceneFile) -> Result<Scene, EvidenceError> {
-    Scene::build(file).map_err(|cause| EvidenceError::Scene { run: run.to_owned(), cause })
+    Scene::build(file).map_err(|cause| EvidenceError::of(run, cause))
 }

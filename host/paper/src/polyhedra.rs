@@ -70,7 +70,7 @@ impl Polyhedra {
 pub fn grasped(count: usize, told: &(dyn Fn(&str) + Sync)) -> Result<Polyhedra, EvidenceError> {
     let like = scene(RUN, "cube-ideal", &["duration_s=5.0".to_owned()])?.file;
     let duration_s = like.duration_s;
-    let hand = PlacingHand::of(like).map_err(|cause| EvidenceError::Scene { run: RUN.to_owned(), cause })?;
+    let hand = PlacingHand::of(like).map_err(|cause| EvidenceError::of(RUN, cause))?;
     let bodies = polyhedra(&mut Draw::new(SEED), count);
     let one = |body: &RandomPolyhedron| -> Result<Option<Outcome>, EvidenceError> {
         let placed = hand.place(hand.hull(body.corners_m.clone()), 1).ok().and_then(|mut all| all.pop());

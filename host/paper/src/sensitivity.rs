@@ -8,6 +8,7 @@ use blindgrasp_sweep::{Axis, Edge, Plan, Row, Stretch, Swept, Value, run_refined
 use rayon::prelude::*;
 use serde_json::{Value as Json, json};
 use std::convert::Infallible;
+use std::fmt::Display;
 
 /// The width to which the value at which a grasp fails is bisected, relative to the larger of the values beside it.
 pub const WIDTH: f64 = 0.1;
@@ -111,12 +112,14 @@ impl Varied {
     /// # Errors
     /// A scene, a setting or a value that is bad: a fault of the program.
     pub fn plan(&self) -> Result<Plan, EvidenceError> {
-        let failed = |cause: String| EvidenceError::Sweep { sweep: self.name, cause };
+        fn failed(name: &str, cause: impl Display) -> EvidenceError {
+            EvidenceError(format!("sweep `{name}`: {cause}"))
+        }
         let settings = self.settings.iter().map(|text| Setting::parse(text)).collect::<Result<_, _>>();
         let axes = self.axes.iter().map(|text| Axis::parse(text)).collect::<Result<_, _>>();
-        let settings = settings.map_err(|error| failed(error.to_string()))?;
-        let axes = axes.map_err(|error| failed(error.to_string()))?;
-        Plan::new(self.scene, settings, axes, 1).map_err(|error| failed(error.to_string()))
+        let settings = settings.map_err(|cause| failed(self.name, cause))?;
+        let axes = axes.map_err(|cause| failed(self.name, cause))?;
+        Plan::new(self.scene, settings, axes, 1).map_err(|cause| failed(self.name, cause))
     }
 }
 

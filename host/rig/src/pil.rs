@@ -25,9 +25,11 @@ use blindgrasp_shared::telemetry::{INTERFACE_VERSION, List};
 use blindgrasp_shared::tick::{Params, Sensed};
 use blindgrasp_sim::controller::{Controller, Reach, Stepped, Turn};
 use blindgrasp_wire::{Answer, Firmware, Packet, Request, Sample, Turned, in_words};
+use std::fmt::Display;
 
 /// Heartbeats in the time that the firmware can do without one.
 const HEARTBEATS: u32 = 3;
+const IDEAL_SENSORS: &str = "sensors.ideal: a firmware has encoders: set it to false";
 
 /// The reason for which a run with a firmware can't begin, or go on.
 #[derive(Debug, thiserror::Error)]
@@ -43,75 +45,22 @@ pub enum PilError {
         "control: {0}; of a gain, the hand's own file allows `firmest_factor` ([safety]) times its own: lower it in the scene or with --set, or raise it in that file"
     )]
     Control(#[from] ParameterError),
-    /// The scene has no encoders.
-    #[error("sensors.ideal: a firmware has encoders: set it to false")]
-    IdealSensors,
-    /// The scene has another tick.
-    #[error(
-        "control.period_s: the firmware's tick has {firmware_us} us, the scene's {scene_us} us: set it to the hand's, or the hand's to it"
-    )]
-    OtherPeriod {
-        /// The firmware's, us.
-        firmware_us: u32,
-        /// The scene's, us.
-        scene_us: u32,
-    },
-    /// The firmware is for another hand.
-    #[error(
-        "the firmware is for another hand than the scene, which needs `{hand}` ({hand_hash:08x}); it is {firmware}. Build it with HAND=FILE (a path from the root of the repository), the file of the scene's hand"
-    )]
-    OtherHand {
-        /// The firmware's description.
-        firmware: String,
-        /// The scene's hand.
-        hand: String,
-        /// Its hash.
-        hand_hash: u32,
-    },
-    /// The firmware has done something before.
-    #[error(
-        "the firmware has done {ticks} ticks since it started, so that nothing can be compared: reset it"
-    )]
-    NotFresh {
-        /// Ticks since its start.
-        ticks: u32,
-    },
-    /// A limit or a fault can't be switched on or off over the link.
-    #[error("`{parameter}` is switched {} in the scene and {} in the firmware, and can't be switched over the link: change the scene, or the hand's file", on(*.scene), on(!*.scene))]
-    Switched {
-        /// One of its parameters.
-        parameter: Parameter,
-        /// `true` if it is on in the scene.
-        scene: bool,
-    },
-    /// It refuses a parameter of the scene.
-    #[error("the firmware refuses the scene's `{parameter}` [{index}] = {value}: {}", .refusal.words())]
-    ParameterRefused {
-        /// The parameter.
-        parameter: Parameter,
-        /// Of which joint or axis.
-        index: u8,
-        /// The value that it was to have.
-        value: f32,
-        /// The refusal.
-        refusal: Refusal,
-    },
-    /// It refuses something.
-    #[error("the firmware refuses {request}: {}", .refusal.words())]
-    Refused {
-        /// The request.
-        request: String,
-        /// The refusal.
-        refusal: Refusal,
-    },
-    /// It answers something else than what it was asked for.
-    #[error("the firmware answers {request} with {answer}")]
-    OddAnswer {
-        /// The request.
-        request: String,
-        /// The answer.
-        answer: String,
-    },
+    /// The scene and the firmware do not go together, or the firmware refuses something.
+    #[error("{0}")]
+    Refused(String),
+}
+
+fn refuse<T>(reason: impl Into<String>) -> Result<T, PilError> {
+    Err(PilError::Refused(reason.into()))
+}
+
+fn refused<T>(request: &str, refusal: Refusal) -> Result<T, PilError> {
+    refuse(format!("the firmware refuses {request}: {}", refusal.words()))
+}
+
+/// Returns the error of an answer that fits no question.
+fn odd<T>(request: &str, answer: impl Display) -> Result<T, PilError> {
+    refuse(format!("the firmware answers {request} with {answer}"))
 }
 
 fn on(on: bool) -> &'static str {
@@ -134,7 +83,7 @@ impl Plan {
     /// If no firmware can do what the scene wants.
     pub fn new(scene: &Scene) -> Result<Self, PilError> {
         if scene.sensors.ideal {
-            return Err(PilError::IdealSensors);
+            return refuse(IDEAL_SENSORS);
         }
         let hand = HandModel::of(scene)?;
         let mut config = scene.controller_config();
@@ -144,7 +93,10 @@ impl Plan {
         }
         let (firmware_us, scene_us) = (hand.config.period_us, config.period_us);
         if firmware_us != scene_us {
-            return Err(PilError::OtherPeriod { firmware_us, scene_us });
+            return refuse(format!(
+                "control.period_s: the firmware's tick has {firmware_us} us, the scene's {scene_us} us: set it to the hand's, or \
+                 the hand's to it"
+            ));
         }
         Ok(Self { params: Params::new(scene.hand.cast(), &config)?, hand })
     }
@@ -217,11 +169,16 @@ impl<T: Transport> Linked<T> {
         if (firmware.hand.as_str(), firmware.hand_hash, firmware.joint_count)
             != (name.as_str(), hand_hash, hand.joint_count())
         {
-            let firmware = firmware.words.clone();
-            return Err(PilError::OtherHand { firmware, hand: name.clone(), hand_hash });
+            return refuse(format!(
+                "the firmware is for another hand than the scene, which needs `{name}` ({hand_hash:08x}); it is {}. Build it with \
+                 HAND=FILE (a path from the root of the repository), the file of the scene's hand",
+                firmware.words
+            ));
         }
         if tick != 0 {
-            return Err(PilError::NotFresh { ticks: tick });
+            return refuse(format!(
+                "the firmware has done {tick} ticks since it started, so that nothing can be compared: reset it"
+            ));
         }
         Ok(())
     }
@@ -304,7 +261,7 @@ impl<P: Peer> Pilot<P> {
         let words = self.words(&request);
         match self.turn(Some(request), sample)?.answer {
             Some(answer) => Ok(answer),
-            None => Err(PilError::OddAnswer { request: words, answer: "nothing".to_owned() }),
+            None => odd(&words, "nothing"),
         }
     }
 
@@ -324,7 +281,7 @@ impl<P: Peer> Pilot<P> {
         let words = self.words(&hello);
         match self.ask(hello, sample)? {
             Answer::Identity { session, .. } => self.session = session,
-            answer => return Err(PilError::OddAnswer { request: words, answer: format!("{answer:?}") }),
+            answer => return odd(&words, format_args!("{answer:?}")),
         }
         let changes = self.changes(sample)?;
         self.configure(changes, sample)?;
@@ -341,10 +298,8 @@ impl<P: Peer> Pilot<P> {
                 let theirs = match self.ask(request, sample)? {
                     Answer::Value(setting) => Some(setting.value),
                     Answer::Refused(Refusal::SwitchedOff) => None,
-                    Answer::Refused(refusal) => return Err(PilError::Refused { request: words, refusal }),
-                    answer => {
-                        return Err(PilError::OddAnswer { request: words, answer: format!("{answer:?}") });
-                    }
+                    Answer::Refused(refusal) => return refused(&words, refusal),
+                    answer => return odd(&words, format_args!("{answer:?}")),
                 };
                 // What only a link and a clock can hurt, a scene does not know.
                 if let Parameter::HEARTBEAT_TIME | Parameter::LATE_TICKS = parameter {
@@ -361,7 +316,13 @@ impl<P: Peer> Pilot<P> {
                         changes.push((parameter, index, ours));
                     }
                     (Some(_), Some(_)) | (None, None) => {}
-                    (ours, _) => return Err(PilError::Switched { parameter, scene: ours.is_some() }),
+                    (ours, _) => {
+                        let (scene, firmware) = (on(ours.is_some()), on(ours.is_none()));
+                        return refuse(format!(
+                            "`{parameter}` is switched {scene} in the scene and {firmware} in the firmware, and can't be switched \
+                             over the link: change the scene, or the hand's file"
+                        ));
+                    }
                 }
             }
         }
@@ -380,11 +341,11 @@ impl<P: Peer> Pilot<P> {
                 let words = self.words(&request);
                 match self.ask(request, sample)? {
                     Answer::Refused(refusal) => {
-                        first_refusal.get_or_insert(PilError::ParameterRefused {
-                            parameter,
-                            index,
-                            value,
-                            refusal,
+                        first_refusal.get_or_insert_with(|| {
+                            format!(
+                                "the firmware refuses the scene's `{parameter}` [{index}] = {value}: {}",
+                                refusal.words()
+                            )
                         });
                         left.push((parameter, index, value));
                     }
@@ -392,7 +353,7 @@ impl<P: Peer> Pilot<P> {
                 }
             }
             match first_refusal {
-                Some(error) if left.len() == changes.len() => return Err(error),
+                Some(reason) if left.len() == changes.len() => return refuse(reason),
                 _ => changes = left,
             }
         }
@@ -425,7 +386,7 @@ impl<P: Peer> Controller for Pilot<P> {
             Sensed::Counts(counts) => (List::first_of(*counts, self.joint_count), None),
             Sensed::Failed(raised) => (List::default(), Some(raised)),
             Sensed::Tested { raised, counts } => (List::first_of(*counts, self.joint_count), Some(raised)),
-            Sensed::Ideal { .. } => return Err(PilError::IdealSensors),
+            Sensed::Ideal { .. } => return refuse(IDEAL_SENSORS),
         };
         let sample = Sample { counts, failed, late: turn.late };
         if !self.greeted {
@@ -450,7 +411,7 @@ impl<P: Peer> Controller for Pilot<P> {
 fn done(answer: Answer, request: String) -> Result<(), PilError> {
     match answer {
         Answer::Done => Ok(()),
-        Answer::Refused(refusal) => Err(PilError::Refused { request, refusal }),
-        answer => Err(PilError::OddAnswer { request, answer: format!("{answer:?}") }),
+        Answer::Refused(refusal) => refused(&request, refusal),
+        answer => odd(&request, format_args!("{answer:?}")),
     }
 }

@@ -77,11 +77,7 @@ impl Carried {
 
 /// Returns the torques of the law on the joints besides damping and weight, N m.
 fn torques(scene: &Scene, samples: &[Sample]) -> Result<Vec<[f64; MAX_JOINTS]>, EvidenceError> {
-    let refused = |cause: blindgrasp_shared::parameter::ParameterError| EvidenceError::Simulation {
-        run: RUN.to_owned(),
-        cause: cause.into(),
-    };
-    let laws = laws(scene).map_err(refused)?;
+    let laws = laws(scene).map_err(|cause| EvidenceError::of(RUN, cause))?;
     let Some(first) = samples.first() else { return Ok(Vec::new()) };
     let latch = Latch::of(&first.posture(&scene.hand), &first.joint_angles_rad());
     let still = [0.0; MAX_JOINTS];

@@ -44,8 +44,7 @@ fn ideal(name: &str) -> Result<SceneFile, EvidenceError> {
 /// Returns the scene of an octahedron, where the search of `scene new` puts it.
 fn octahedron() -> Result<SceneFile, EvidenceError> {
     let like = ideal("cube-ideal")?;
-    let refused = |cause| EvidenceError::Scene { run: RUN.to_owned(), cause };
-    let hand = PlacingHand::of(like).map_err(refused)?;
+    let hand = PlacingHand::of(like).map_err(|cause| EvidenceError::of(RUN, cause))?;
     let corner = |axis: usize, sign: f64| {
         let mut point_m = [0.0; 3];
         point_m[axis] = sign * OCTAHEDRON_M;
@@ -53,7 +52,7 @@ fn octahedron() -> Result<SceneFile, EvidenceError> {
     };
     let corners = (0..3).flat_map(|axis| [1.0, -1.0].map(|sign| corner(axis, sign))).collect();
     let placed = hand.place(hand.hull(corners), 1);
-    let none = || EvidenceError::NoGrasp(RUN.to_owned());
+    let none = || EvidenceError::of(RUN, "the search finds no grasp for its object");
     placed.ok().and_then(|mut all| all.pop()).map(|placement| placement.scene.file).ok_or_else(none)
 }
 
