@@ -42,37 +42,18 @@ pub struct Found {
 /// The reason for which a sweep can't have its journal.
 #[derive(Debug, Error)]
 pub enum JournalError {
-    /// It is another's.
-    #[error(
-        "{}: belongs to another sweep: {difference} differs; run that one again, choose another --out, or start anew with --force",
-        path.display()
-    )]
-    Another {
-        /// The journal.
-        path: PathBuf,
-        /// The difference.
-        difference: String,
-    },
+    /// It is another's, and what differs.
+    #[error("{}: belongs to another sweep: {1} differs; run that one again, choose another --out, or start anew with --force", .0.display())]
+    Another(PathBuf, String),
     /// It is something else, or its beginning is damaged.
-    #[error("{}: is not a journal of a sweep; choose another --out, or overwrite it with --force", path.display())]
-    NoJournal {
-        /// The file.
-        path: PathBuf,
-    },
+    #[error("{}: is not a journal of a sweep; choose another --out, or overwrite it with --force", .0.display())]
+    NoJournal(PathBuf),
     /// Somebody writes it.
-    #[error("{}: another sweep is writing it; wait for it, or choose another --out", path.display())]
-    Busy {
-        /// The journal.
-        path: PathBuf,
-    },
+    #[error("{}: another sweep is writing it; wait for it, or choose another --out", .0.display())]
+    Busy(PathBuf),
     /// The file system said no.
-    #[error("cannot write {}", path.display())]
-    Io {
-        /// The journal.
-        path: PathBuf,
-        /// The cause.
-        source: io::Error,
-    },
+    #[error("cannot write {}", .0.display())]
+    Io(PathBuf, #[source] io::Error),
 }
 
 impl Journal {
@@ -81,10 +62,10 @@ impl Journal {
     /// # Errors
     /// It is that of another sweep or no journal, without `force`; somebody else writes it; or what the file system says.
     pub fn open(path: &Path, identity: &Identity, force: bool) -> Result<(Self, Found), JournalError> {
-        let failed = |source| JournalError::Io { path: path.to_owned(), source };
+        let failed = |source| JournalError::Io(path.to_owned(), source);
         let mut file = OpenOptions::new().read(true).append(true).create(true).open(path).map_err(failed)?;
         file.try_lock().map_err(|error| match error {
-            TryLockError::WouldBlock => JournalError::Busy { path: path.to_owned() },
+            TryLockError::WouldBlock => JournalError::Busy(path.to_owned()),
             TryLockError::Error(source) => failed(source),
         })?;
         let mut bytes = Vec::new();
@@ -95,11 +76,10 @@ impl Journal {
         let mut found = Found::default();
         let whole = match begun(&bytes) {
             Begun::Not => 0,
-            Begun::Otherwise => return Err(JournalError::NoJournal { path: path.to_owned() }),
+            Begun::Otherwise => return Err(JournalError::NoJournal(path.to_owned())),
             Begun::By(another, rest) => {
                 if let Some(difference) = identity.difference(&another) {
-                    let difference = difference.to_owned();
-                    return Err(JournalError::Another { path: path.to_owned(), difference });
+                    return Err(JournalError::Another(path.to_owned(), difference.to_owned()));
                 }
                 let mut rest = rest;
                 while let Some((row, behind)) = next(rest) {
@@ -161,7 +141,7 @@ impl Journal {
     }
 
     fn failed(&self, source: io::Error) -> JournalError {
-        JournalError::Io { path: self.path.clone(), source }
+        JournalError::Io(self.path.clone(), source)
     }
 }
 

@@ -22,38 +22,20 @@ pub struct Output {
 #[derive(Debug, Error)]
 pub enum OutputError {
     /// Its ending says nothing.
-    #[error("--out: {}: a sweep is written to a file that ends in .parquet or .csv", path.display())]
-    Ending {
-        /// The file.
-        path: PathBuf,
-    },
+    #[error("--out: {}: a sweep is written to a file that ends in .parquet or .csv", .0.display())]
+    Ending(PathBuf),
     /// A file can't be written, or may not be.
     #[error(transparent)]
     File(#[from] files::OutputError),
     /// The folder can't be made.
-    #[error("cannot write {}", path.display())]
-    Folder {
-        /// The folder.
-        path: PathBuf,
-        /// The cause.
-        source: io::Error,
-    },
+    #[error("cannot write {}", .0.display())]
+    Folder(PathBuf, #[source] io::Error),
     /// The table can't be written.
-    #[error("{}", path.display())]
-    Table {
-        /// The file.
-        path: PathBuf,
-        /// The cause.
-        source: TableError,
-    },
+    #[error("{}", .0.display())]
+    Table(PathBuf, #[source] TableError),
     /// A picture can't be drawn.
-    #[error("cannot draw {}: {reason}", path.display())]
-    Draw {
-        /// The file that it was for.
-        path: PathBuf,
-        /// The error of the drawing library.
-        reason: String,
-    },
+    #[error("cannot draw {}: {1}", .0.display())]
+    Draw(PathBuf, String),
 }
 
 impl Output {
@@ -65,9 +47,9 @@ impl Output {
         let format = match path.extension().and_then(|ending| ending.to_str()) {
             Some("parquet") => Format::Parquet,
             Some("csv") => Format::Csv,
-            _ => return Err(OutputError::Ending { path: path.to_owned() }),
+            _ => return Err(OutputError::Ending(path.to_owned())),
         };
-        format.check().map_err(|source| OutputError::Table { path: path.to_owned(), source })?;
+        format.check().map_err(|source| OutputError::Table(path.to_owned(), source))?;
         Ok(Self { path: path.to_owned(), format })
     }
 
@@ -90,8 +72,7 @@ impl Output {
     /// A file is there, or a directory in its place; or what the file system says.
     pub fn prepare(&self, plan: &Plan, force: bool) -> Result<(), OutputError> {
         if let Some(folder) = self.path.parent() {
-            fs::create_dir_all(folder)
-                .map_err(|source| OutputError::Folder { path: folder.to_owned(), source })?;
+            fs::create_dir_all(folder).map_err(|source| OutputError::Folder(folder.to_owned(), source))?;
         }
         let may_overwrite = force || self.journal().exists();
         for path in [self.path.clone()].into_iter().chain(self.pictures(plan)) {
@@ -113,7 +94,7 @@ impl Output {
     pub fn write(&self, plan: &Plan, rows: &[Row]) -> Result<(), OutputError> {
         if let Some(drawn) = picture::draw(plan, rows) {
             for (path, bytes) in self.pictures(plan).into_iter().zip(drawn) {
-                let bytes = bytes.map_err(|reason| OutputError::Draw { path: path.clone(), reason })?;
+                let bytes = bytes.map_err(|reason| OutputError::Draw(path.clone(), reason))?;
                 files::write(&path, bytes, true)?;
             }
         }
@@ -123,7 +104,7 @@ impl Output {
             table.write(rows)?;
             table.finish()
         };
-        write().map_err(|source| OutputError::Table { path: self.path.clone(), source })?;
+        write().map_err(|source| OutputError::Table(self.path.clone(), source))?;
         Ok(file.finish()?)
     }
 }

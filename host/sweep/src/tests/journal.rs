@@ -117,7 +117,7 @@ fn a_damaged_journal_gives_no_wrong_row() {
             }
             Err(error) => {
                 refused += 1;
-                assert!(matches!(error, JournalError::NoJournal { .. }), "{error}");
+                assert!(matches!(error, JournalError::NoJournal(_)), "{error}");
                 assert_eq!(fs::read(&path).unwrap(), bytes, "what is refused is left alone");
             }
         }
@@ -157,15 +157,6 @@ fn the_journal_of_another_sweep_is_refused_with_what_differs() {
     // A value that is varied anyway may differ, and so may comments.
     copy("force_n = 5.0 # N");
     assert_eq!(Journal::open(&path, &identity(&[], friction, 1, None), false).unwrap().1.rows.len(), 2);
-
-    let no_journal = folder.path().join("notes.txt");
-    fs::write(&no_journal, "buy milk").unwrap();
-    let error = Journal::open(&no_journal, &identity(&[], friction, 1, None), false).unwrap_err().to_string();
-    let path = no_journal.display();
-    assert_eq!(
-        error,
-        format!("{path}: is not a journal of a sweep; choose another --out, or overwrite it with --force")
-    );
 }
 
 /// Nothing is kept by halves: after a write that failed, the next one follows what is whole.
