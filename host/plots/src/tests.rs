@@ -5,39 +5,15 @@ use super::run::all;
 use super::write;
 use blindgrasp_sim::sample::Sample;
 use blindgrasp_view::{Report, ReportError};
-use nalgebra::{Matrix3, Vector3};
-use std::collections::BTreeMap;
-use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 #[path = "../../view/src/fixture.rs"]
 mod fixture;
 
-/// A directory of a test's own, removed in the end.
-struct Scratch(PathBuf);
-
-impl Scratch {
-    fn new(name: &str) -> Self {
-        let path = std::env::temp_dir().join(format!("blindgrasp-report-{}-{name}", std::process::id()));
-        let _ = fs::remove_dir_all(&path);
-        Self(path)
-    }
-}
-
-impl Drop for Scratch {
-    fn drop(&mut self) {
-        let _ = fs::remove_dir_all(&self.0);
-    }
-}
+use fixture::{Scratch, decoded, files, spoilt};
 
 fn report_of(samples: &[Sample], dir: &Path) -> Result<(), ReportError> {
-    let (hand, names, object) = (fixture::hand(), fixture::joint_names(), fixture::prism());
-    write(dir, &Report { title: "prism", hand: &hand, joint_names: &names, object: &object, samples })
-}
-
-fn files(dir: &Path) -> BTreeMap<String, Vec<u8>> {
-    let entries = fs::read_dir(dir).unwrap().map(|entry| entry.unwrap());
-    entries.map(|e| (e.file_name().into_string().unwrap(), fs::read(e.path()).unwrap())).collect()
+    fixture::report_of(write, samples, dir)
 }
 
 const FILES: [&str; 8] = [
@@ -50,15 +26,6 @@ const FILES: [&str; 8] = [
     "residuals.png",
     "residuals.svg",
 ];
-
-/// Size and pixels of a PNG file.
-fn decoded(file: &[u8]) -> ((u32, u32), Vec<u8>) {
-    let mut reader = png::Decoder::new(std::io::Cursor::new(file)).read_info().unwrap();
-    let mut pixels = vec![0; reader.output_buffer_size().unwrap()];
-    let info = reader.next_frame(&mut pixels).unwrap();
-    assert_eq!((info.color_type, info.bit_depth), (png::ColorType::Rgb, png::BitDepth::Eight));
-    ((info.width, info.height), pixels)
-}
 
 #[test]
 fn a_report_has_every_file_whole_and_the_same_bytes_twice() {
@@ -123,55 +90,11 @@ fn plots_show_single_samples_and_say_where_there_is_nothing() {
 #[test]
 fn values_that_are_no_numbers_or_missing_do_no_harm() {
     let scratch = Scratch::new("nan");
-    let mut samples = fixture::samples(40);
-    for (k, sample) in samples.iter_mut().enumerate().skip(10) {
-        let bad = [f64::NAN, f64::INFINITY, f64::NEG_INFINITY, 1e308][k % 4];
-        sample.angles_rad.fill(bad);
-        sample.speeds_rad_s.fill(bad);
-        sample.position_m.fill(bad);
-        sample.velocity_m_s.fill(bad);
-        for contact in &mut sample.contacts {
-            contact.normal_force_n = bad;
-            contact.lambda_n = [bad; 2];
-            contact.point_m = Vector3::repeat(bad);
-            contact.frame = Matrix3::repeat(bad);
-            contact.force_residual_n = Vector3::repeat(bad);
-            contact.moment_residual_nm = Vector3::zeros();
-        }
-    }
-    samples[5].t_s = f64::NAN;
-    samples[6].contacts.clear();
-    samples[7].speeds_rad_s.clear();
-    samples[8].angles_rad.clear();
-    report_of(&samples, &scratch.0).unwrap();
+    report_of(&spoilt(), &scratch.0).unwrap();
     assert_eq!(files(&scratch.0).len(), FILES.len());
 }
 
 #[test]
 fn what_cannot_be_written_is_named() {
-    let scratch = Scratch::new("blocked");
-    fs::create_dir_all(&scratch.0).unwrap();
-    let file = scratch.0.join("file");
-    fs::write(&file, "in the way").unwrap();
-    let error = report_of(&[], &file.join("below")).unwrap_err();
-    assert!(matches!(error, ReportError::Directory { .. }));
-    assert!(error.to_string().starts_with("cannot create the directory "), "{error}");
-    assert!(error.to_string().contains("below: "), "{error}");
-
-    // A directory where a file should go.
-    let blocked = scratch.0.join("joint-velocities.svg");
-    fs::create_dir_all(&blocked).unwrap();
-    let error = report_of(&[], &scratch.0).unwrap_err();
-    assert!(matches!(&error, ReportError::Write { path, .. } if *path == blocked), "{error}");
-}
-
-#[cfg(target_os = "linux")]
-#[test]
-fn a_full_disk_is_an_error() {
-    let scratch = Scratch::new("full");
-    fs::create_dir_all(&scratch.0).unwrap();
-    std::os::unix::fs::symlink("/dev/full", scratch.0.join("residuals.svg")).unwrap();
-    let error = report_of(&[], &scratch.0).unwrap_err();
-    let ReportError::Write { path, cause } = &error else { panic!("{error}") };
-    assert!(path.ends_with("residuals.svg") && cause.kind() == std::io::ErrorKind::StorageFull, "{error}");
+    fixture::check_failures(write, "joint-velocities.svg");
 }

@@ -1,12 +1,16 @@
 //! A made-up run: three fingers of four joints close on a prism, swing, and settle.
 
+use super::{Report, ReportError};
 use blindgrasp_body::Hand;
 use blindgrasp_body::polyhedron::{Face, Polyhedron};
 use blindgrasp_shared::hand::{Fingertip, Joint, Link};
 use blindgrasp_shared::math::Real;
 use blindgrasp_sim::sample::{ContactSample, EnergySample, Sample};
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
+use std::collections::BTreeMap;
 use std::f64::consts::TAU;
+use std::fs;
+use std::path::{Path, PathBuf};
 
 const FINGERS: usize = 3;
 const TIP_RADIUS_M: f64 = 0.010;
@@ -140,5 +144,98 @@ fn sample(t_s: f64) -> Sample {
         energy_j: 0.1,
         energies: EnergySample::default(),
         mode: "grasping",
+    }
+}
+
+/// A directory of a test's own, removed in the end.
+pub(super) struct Scratch(pub(super) PathBuf);
+
+impl Scratch {
+    pub(super) fn new(name: &str) -> Self {
+        let path = std::env::temp_dir().join(format!("blindgrasp-report-{}-{name}", std::process::id()));
+        let _ = fs::remove_dir_all(&path);
+        Self(path)
+    }
+}
+
+impl Drop for Scratch {
+    fn drop(&mut self) {
+        let _ = fs::remove_dir_all(&self.0);
+    }
+}
+
+/// The files of a folder.
+pub(super) fn files(dir: &Path) -> BTreeMap<String, Vec<u8>> {
+    let entries = fs::read_dir(dir).unwrap().map(|entry| entry.unwrap());
+    entries.map(|e| (e.file_name().into_string().unwrap(), fs::read(e.path()).unwrap())).collect()
+}
+
+/// Size and pixels of a PNG file.
+pub(super) fn decoded(file: &[u8]) -> ((u32, u32), Vec<u8>) {
+    let mut reader = png::Decoder::new(std::io::Cursor::new(file)).read_info().unwrap();
+    let mut pixels = vec![0; reader.output_buffer_size().unwrap()];
+    let info = reader.next_frame(&mut pixels).unwrap();
+    assert_eq!((info.color_type, info.bit_depth), (png::ColorType::Rgb, png::BitDepth::Eight));
+    ((info.width, info.height), pixels)
+}
+
+/// Samples with values that are no numbers, or missing.
+pub(super) fn spoilt() -> Vec<Sample> {
+    let mut samples = samples(40);
+    for (k, sample) in samples.iter_mut().enumerate().skip(10) {
+        let bad = [f64::NAN, f64::INFINITY, f64::NEG_INFINITY, 1e308][k % 4];
+        sample.angles_rad.fill(bad);
+        sample.speeds_rad_s.fill(bad);
+        sample.position_m.fill(bad);
+        sample.velocity_m_s.fill(bad);
+        for contact in &mut sample.contacts {
+            contact.normal_force_n = bad;
+            contact.lambda_n = [bad; 2];
+            contact.point_m = Vector3::repeat(bad);
+            contact.frame = Matrix3::repeat(bad);
+            contact.force_residual_n = Vector3::repeat(bad);
+            contact.moment_residual_nm = Vector3::zeros();
+        }
+    }
+    samples[5].t_s = f64::NAN;
+    samples[6].contacts.clear();
+    samples[7].speeds_rad_s.clear();
+    samples[8].angles_rad.clear();
+    samples
+}
+
+/// A function that writes a report.
+pub(super) type Write = fn(&Path, &Report<'_>) -> Result<(), ReportError>;
+
+/// Writes a report of samples.
+pub(super) fn report_of(write: Write, samples: &[Sample], dir: &Path) -> Result<(), ReportError> {
+    let (hand, names, object) = (hand(), joint_names(), prism());
+    write(dir, &Report { title: "prism", hand: &hand, joint_names: &names, object: &object, samples })
+}
+
+/// Checks that what can't be written is named, for one file of a report.
+pub(super) fn check_failures(write: Write, name: &str) {
+    let scratch = Scratch::new("failures");
+    fs::create_dir_all(&scratch.0).unwrap();
+    let file = scratch.0.join("file");
+    fs::write(&file, "in the way").unwrap();
+    let error = report_of(write, &[], &file.join("below")).unwrap_err();
+    assert!(matches!(error, ReportError::Directory { .. }));
+    assert!(error.to_string().starts_with("cannot create the directory "), "{error}");
+    assert!(error.to_string().contains("below: "), "{error}");
+
+    // A directory where a file should go.
+    let blocked = scratch.0.join(name);
+    fs::create_dir_all(&blocked).unwrap();
+    let error = report_of(write, &[], &scratch.0).unwrap_err();
+    assert!(matches!(&error, ReportError::Write { path, .. } if *path == blocked), "{error}");
+    // And a full disk.
+    #[cfg(target_os = "linux")]
+    {
+        fs::remove_dir(&blocked).unwrap();
+        std::os::unix::fs::symlink("/dev/full", &blocked).unwrap();
+        let error = report_of(write, &[], &scratch.0).unwrap_err();
+        let ReportError::Write { path, cause } = &error else { panic!("{error}") };
+        assert!(*path == blocked && cause.kind() == std::io::ErrorKind::StorageFull, "{error}");
     }
 }
