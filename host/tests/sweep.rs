@@ -319,24 +319,12 @@ fn what_cannot_be_swept_is_refused_with_what_to_do() {
             "--vary: control.forc_n: unknown key; did you mean `force_n`?",
         ),
         (
-            vec!["cube", "--vary", "control.force_n=1..2", "--out", "x.csv"],
-            "--vary: control.force_n: the number of values is missing; write KEY=FROM..TO:N, KEY=FROM..TO:N:log or KEY=A,B,C",
-        ),
-        (
             vec!["cube", "--vary", "control.force_n=4,5", "--out", "x.xlsx"],
             "--out: x.xlsx: a sweep is written to a file that ends in .parquet or .csv",
         ),
         (
             vec!["cube", "--out", "x.csv"],
             "there is nothing to sweep: give --vary KEY=FROM..TO:N, or --seeds N",
-        ),
-        (
-            vec!["ball", "--vary", "control.force_n=4,5", "--out", "x.csv"],
-            "ball: no built-in scene is called `ball`; known: prism, cube, prism-ideal, cube-ideal, prism-normal-only, cube-normal-only, hand-arm, hand-arm-consistent, hand-arm-firm, hand-arm-normal-only, l-bracket, two-finger-prism, four-finger-cube, allegro-like-prism (a path has to end in .toml or contain a /)",
-        ),
-        (
-            with(&["--set", "control.force_n=3"]),
-            "--vary: control.force_n: is both set and varied; leave one of them out",
         ),
         (
             with(&["--set", "control.force"]),

@@ -51,19 +51,6 @@ fn what_is_refused_says_why() {
 }
 
 #[test]
-fn rows_do_not_depend_on_the_threads() {
-    let plan =
-        plan("cube", &["duration_s=0.1"], &["control.force_n=1..8:8", "friction.scale=0,-1,1"], 1).unwrap();
-    let with = |threads| {
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-        outcomes(&pool.install(|| run(&plan)))
-    };
-    let alone = with(1);
-    assert_eq!(alone.len(), 24);
-    assert!(with(2) == alone && with(7) == alone);
-}
-
-#[test]
 fn an_end_that_is_wanted_comes_and_keeps_what_is_done() {
     let plan = plan("cube", &["duration_s=0.1"], &["control.force_n=1..20:20"], 1).unwrap();
     let all: Vec<usize> = (0..20).collect();
