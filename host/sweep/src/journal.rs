@@ -43,7 +43,7 @@ pub struct Found {
 #[derive(Debug, Error)]
 pub enum JournalError {
     /// It is another's, and what differs.
-    #[error("{}: belongs to another sweep: {1} differs; run that one again, choose another --out, or start anew with --force", .0.display())]
+    #[error("{}: belongs to another sweep: {} differs; run that one again, choose another --out, or start anew with --force", .0.display(), .1)]
     Another(PathBuf, String),
     /// It is something else, or its beginning is damaged.
     #[error("{}: is not a journal of a sweep; choose another --out, or overwrite it with --force", .0.display())]

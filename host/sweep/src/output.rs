@@ -34,7 +34,7 @@ pub enum OutputError {
     #[error("{}", .0.display())]
     Table(PathBuf, #[source] TableError),
     /// A picture can't be drawn.
-    #[error("cannot draw {}: {1}", .0.display())]
+    #[error("cannot draw {}: {}", .0.display(), .1)]
     Draw(PathBuf, String),
 }
 
