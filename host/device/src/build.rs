@@ -86,8 +86,7 @@ fn hand_file(root: &Path, hand: &HandModel, file: &HandFile) -> Result<Option<Pa
     // The same hand has the same path, so that cargo sees that it has not changed.
     let target = env::var_os("CARGO_TARGET_DIR").map_or(root.join("target"), PathBuf::from);
     let path = root.join(target).join("hands").join(format!("{}-{:08x}.toml", hand.name, hand.hash()));
-    // What TOML can't express is in no hand.
-    let text = toml::to_string(file).unwrap_or_default();
+    let text = file.to_toml();
     if fs::read_to_string(&path).ok().as_ref() != Some(&text) {
         let written = fs::create_dir_all(path.parent().unwrap_or(root)).and_then(|()| fs::write(&path, text));
         written.map_err(|source| BuildError::Hand { path: path.clone(), source })?;

@@ -198,8 +198,7 @@ impl Scene {
 
     /// The effective configuration, hand and object included. Reading it gives this scene again.
     pub fn effective_toml(&self) -> String {
-        // Only what TOML can't express fails, and none of the structs contains such a thing.
-        toml::to_string(&self.file).unwrap_or_default()
+        self.file.to_toml()
     }
 
     /// The configuration of the controller; zero beyond the hand's joints.
@@ -229,7 +228,20 @@ impl Scene {
     }
 }
 
+impl SceneFile {
+    /// Returns the text of its file, hand and object included.
+    pub fn to_toml(&self) -> String {
+        // Only what TOML can't express fails, and none of the structs contains such a thing.
+        toml::to_string(self).unwrap_or_default()
+    }
+}
+
 impl HandFile {
+    /// Returns the text of its file.
+    pub fn to_toml(&self) -> String {
+        toml::to_string(self).unwrap_or_default()
+    }
+
     /// Names of the built-in hands.
     pub fn built_in() -> impl Iterator<Item = &'static str> {
         Kind::Hand.built_in().iter().map(|(name, _)| *name)

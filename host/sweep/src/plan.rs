@@ -208,7 +208,7 @@ impl Plan {
     /// error. What settings and axes change is in it as the first run has it.
     pub(super) fn contents(&self) -> Vec<String> {
         let content = |opened: &Opened| match &opened.first {
-            Ok((_, file)) => toml::to_string(file).unwrap_or_default(),
+            Ok((_, file)) => file.to_toml(),
             Err(error) => error.to_string(),
         };
         self.drafts.iter().map(content).collect()

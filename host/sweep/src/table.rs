@@ -155,8 +155,7 @@ impl Layout for Columns<'_> {
                 double(values(&summary.last).get(*finger).copied())
             }
             (Source::Configuration, Outcome::Ran(_)) => {
-                let file = self.plan.file(row.run).ok();
-                file.and_then(|file| toml::to_string(&file).ok()).map_or(Cell::Missing, Cell::Text)
+                self.plan.file(row.run).map_or(Cell::Missing, |file| Cell::Text(file.to_toml()))
             }
         }
     }

@@ -98,8 +98,7 @@ impl About {
     /// become angles.
     #[must_use]
     pub fn with_hand(mut self, file: &HandFile) -> Self {
-        // Only what TOML can't express fails, and none of the structs contains such a thing.
-        self.hand_file = toml::to_string(file).ok();
+        self.hand_file = Some(file.to_toml());
         self.joint_names = file.joints.iter().map(|joint| joint.name.clone()).collect();
         self
     }
