@@ -20,11 +20,11 @@ struct Loop {
 
 impl Loop {
     fn new(name: &str) -> Self {
-        let scene = Scene::load(name, &[]).expect("a shipped scene");
-        let plant = sim::plant(&scene).expect("a shipped scene");
+        let scene = Scene::load(name, &[]).expect("built in");
+        let plant = sim::plant(&scene).expect("it can be simulated");
         let start = *plant.motion();
         let latch = Latch::of(plant.posture(), &start.angles_rad);
-        Self { laws: sim::laws(&scene).expect("a shipped scene"), latch, start, scene }
+        Self { laws: sim::laws(&scene).expect("good gains"), latch, start, scene }
     }
 
     fn torques(&self, posture: &Posture, motion: &Motion) -> JointVector {
@@ -39,7 +39,7 @@ impl Loop {
             fingertip_friction: vec![friction; self.scene.hand.fingertip_count()],
             ..World::default()
         };
-        coulomb::Plant::new(sim::model(&self.scene), world, self.start, substep_s).expect("a shipped scene")
+        coulomb::Plant::new(sim::model(&self.scene), world, self.start, substep_s).expect("a convex object")
     }
 }
 

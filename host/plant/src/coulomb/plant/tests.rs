@@ -1,8 +1,10 @@
 //! Physics against closed forms, conservation laws and itself at other steps.
 
 mod grasps;
+mod joints;
 mod order;
 mod robustness;
+mod speed;
 mod tables;
 
 use super::*;
@@ -50,8 +52,8 @@ fn hand(arms: &[(Joint<f64>, Vector3<f64>)]) -> Hand {
 
 /// A hand far away, that does nothing.
 fn no_hand() -> Hand {
-    let far = |x_m: f64| arm(Vector3::new(x_m, 100.0, 100.0), Vector3::new(x_m, 100.1, 100.0));
-    hand(&[far(100.0), far(101.0)])
+    let far = |x_m: f64| arm(Vector3::new(x_m, 3.0, 3.0), Vector3::new(x_m, 3.1, 3.0));
+    hand(&[far(3.0), far(4.0)])
 }
 
 fn object(shape: Polyhedron, mass_kg: f64) -> ObjectModel {

@@ -49,7 +49,7 @@ fn grasp(fingers: usize, margin: f64, off_m: Vector3<f64>, substep_s: f64) -> (P
 #[test]
 fn a_held_object_does_not_creep() {
     for fingers in [2, 3, 4] {
-        for margin in [1.05, 2.0, 10.0, 95.0] {
+        for margin in [1.05, 95.0] {
             let (mut plant, torques_nm) = grasp(fingers, margin, Vector3::zeros(), 1e-3);
             plant.run(&torques_nm, 1.0, |_| {});
             let settled_m = plant.motion().position_m;
