@@ -118,19 +118,36 @@ impl MassFactor {
 
     /// `L^-1 b`, in place.
     pub(super) fn whiten(&self, b: &mut Everything) {
-        for (i, finger) in self.branches.fingers.iter().enumerate() {
-            let mut part = [0.0; MAX_CHAIN];
-            for (a, &j) in finger.iter().enumerate() {
-                part[a] = b.joints[j];
-            }
-            forward(&self.finger_factors[i], finger.len(), &mut part);
-            for (a, &j) in finger.iter().enumerate() {
-                b.joints[j] = part[a];
-            }
-            for (t, &k) in self.branches.trunk.iter().enumerate() {
-                b.joints[k] -= dot(&self.finger_trunk[i][t], &part, finger.len());
-            }
+        for i in 0..self.branches.fingers.len() {
+            self.whiten_finger(i, b);
         }
+        self.whiten_head(b);
+    }
+
+    /// The same for what is zero in all fingers but one.
+    pub(super) fn whiten_branch(&self, finger: Option<usize>, b: &mut Everything) {
+        if let Some(i) = finger {
+            self.whiten_finger(i, b);
+        }
+        self.whiten_head(b);
+    }
+
+    fn whiten_finger(&self, i: usize, b: &mut Everything) {
+        let finger = &self.branches.fingers[i];
+        let mut part = [0.0; MAX_CHAIN];
+        for (a, &j) in finger.iter().enumerate() {
+            part[a] = b.joints[j];
+        }
+        forward(&self.finger_factors[i], finger.len(), &mut part);
+        for (a, &j) in finger.iter().enumerate() {
+            b.joints[j] = part[a];
+        }
+        for (t, &k) in self.branches.trunk.iter().enumerate() {
+            b.joints[k] -= dot(&self.finger_trunk[i][t], &part, finger.len());
+        }
+    }
+
+    fn whiten_head(&self, b: &mut Everything) {
         let mut part = [0.0; MAX_CHAIN];
         for (t, &k) in self.branches.trunk.iter().enumerate() {
             part[t] = b.joints[k];
@@ -143,6 +160,13 @@ impl MassFactor {
             *v /= self.root_mass;
         }
         forward(&self.inertia_factor, 3, &mut b.object[3..]);
+    }
+
+    /// Scalar product of two vectors, the first of which is zero in all fingers but one.
+    pub(super) fn product(&self, finger: Option<usize>, a: &Everything, b: &Everything) -> f64 {
+        let joints = finger.map_or(&[][..], |i| &self.branches.fingers[i]).iter().chain(&self.branches.trunk);
+        let in_joints: f64 = joints.map(|&k| a.joints[k] * b.joints[k]).sum();
+        in_joints + dot(&a.object, &b.object, OBJECT)
     }
 
     /// `L^-T y`, in place.

@@ -82,12 +82,15 @@ pub struct Plant {
     now: Placed,
     ahead: Placed,
     mass: MassFactor,
-    /// Contacts at this instant, their rows, and these times the inverse factor of the mass matrix.
+    /// Contacts at this instant; their rows, which are zero in all fingers but one; and these times the inverse factor of the
+    /// mass matrix.
     touches: Vec<Touch>,
+    fingers: Vec<Option<usize>>,
     rows: Vec<Everything>,
     whitened: Vec<Everything>,
-    /// Rates of the contacts' depths half a step ago.
+    /// Rates of the contacts' depths half a step ago; and about now, with velocities extrapolated.
     rates_m_s: Vec<f64>,
+    guesses_m_s: Vec<f64>,
     problem: Problem,
     projection: Problem,
     contacts: Vec<Contact>,
@@ -134,9 +137,11 @@ impl Plant {
             ahead: Placed::new(),
             mass: MassFactor::new(&model.hand),
             touches: Vec::new(),
+            fingers: Vec::new(),
             rows: Vec::new(),
             whitened: Vec::new(),
             rates_m_s: Vec::new(),
+            guesses_m_s: Vec::new(),
             problem: Problem::default(),
             projection: Problem::default(),
             contacts: Vec::new(),
@@ -252,11 +257,11 @@ impl Plant {
         self.collect();
         self.set_problem(tau, &push);
 
-        let Self { touches, rates_m_s, problem, as_rolling, started, .. } = self;
+        let Self { touches, rates_m_s, guesses_m_s, problem, as_rolling, started, .. } = self;
         let law = |k: usize, rate_m_s: f64| {
             respond(&touches[k], rates_m_s[k], rate_m_s, (path_s, tau), (*started, *as_rolling))
         };
-        problem.solve(law, rates_m_s);
+        problem.solve(law, guesses_m_s);
 
         for (row, force) in self.whitened.iter().zip(&self.problem.forces) {
             add(&mut push, *force, row);
@@ -406,27 +411,38 @@ impl Plant {
     fn set_problem(&mut self, tau: f64, push: &Everything) {
         let (t_s, h) = (self.time_s(), self.substep_s);
         let around_s = if self.started { (t_s - h, t_s + h) } else { (t_s, t_s + h) };
-        let Self { now, model, world, touches, rows, whitened, mass, problem, before, .. } = self;
+        let about_now = velocities(&self.motion);
+        let Self { now, model, world, touches, fingers, rows, whitened, mass, problem, before, .. } = self;
+        self.guesses_m_s.clear();
         problem.clear();
         rows.clear();
+        fingers.clear();
         for touch in touches.iter() {
             problem.add(touch.tangents(), touch.friction.sliding);
-            rows.extend((0..=touch.tangents()).map(|part| now.row(model, touch, part)));
+            for part in 0..=touch.tangents() {
+                rows.push(now.row(model, touch, part));
+                fingers.push(touch.pair.finger(&mass.branches));
+            }
         }
         problem.make_room();
         let mut r = 0;
         for touch in touches.iter() {
             let table_m_s = table_velocity(world, touch, around_s);
             for part in 0..=touch.tangents() {
-                problem.free[r] = times(&rows[r], before) + touch.along(part, &table_m_s);
+                let along_m_s = touch.along(part, &table_m_s);
+                if part == 0 {
+                    let gap_m_s = mass.product(fingers[r], &rows[r], &about_now) + along_m_s;
+                    self.guesses_m_s.push(-gap_m_s);
+                }
+                problem.free[r] = mass.product(fingers[r], &rows[r], before) + along_m_s;
                 r += 1;
             }
         }
-        whiten_all(mass, rows, whitened);
-        for (free, row) in problem.free.iter_mut().zip(whitened.iter()) {
-            *free += tau * times(row, push);
+        whiten_all(mass, fingers, rows, whitened);
+        for ((free, row), finger) in problem.free.iter_mut().zip(whitened.iter()).zip(fingers.iter()) {
+            *free += tau * mass.product(*finger, row, push);
         }
-        delassus(whitened, model.hand.joint_count(), tau, problem);
+        delassus(mass, fingers, whitened, tau, problem);
     }
 
     /// Powers at this instant, with the velocities that were solved for.
@@ -537,7 +553,7 @@ impl Plant {
         let mut half = *before;
         set_tail(&mut half.object, &solve_inertia(&inertia_kg_m2, spin_momentum));
 
-        let Self { touches, rows, whitened, mass, problem, projection, .. } = self;
+        let Self { touches, fingers, rows, whitened, mass, problem, projection, .. } = self;
         touches.clear();
         ahead.touches((model, world), (shape, materials), t_s + 0.5 * h, f64::INFINITY, |touch| {
             if stuck.contains(&touch.pair) {
@@ -545,11 +561,13 @@ impl Plant {
             }
         });
         rows.clear();
+        fingers.clear();
         projection.clear();
         for touch in touches.iter() {
             for part in 1..=touch.tangents() {
                 projection.add(0, 0.0);
                 rows.push(ahead.row(model, touch, part));
+                fingers.push(touch.pair.finger(&mass.branches));
             }
         }
         projection.make_room();
@@ -566,8 +584,8 @@ impl Plant {
         if !(mass.factorize(&ahead.mass, &[0.0; MAX_JOINTS], &object) > LEAST_PIVOT) {
             return;
         }
-        whiten_all(mass, rows, whitened);
-        delassus(whitened, model.hand.joint_count(), 1.0, projection);
+        whiten_all(mass, fingers, rows, whitened);
+        delassus(mass, fingers, whitened, 1.0, projection);
         let Some(lost_j) = projection.project() else { return };
         problem.counters.projections += 1;
         let mut change = Everything::ZERO;
@@ -612,20 +630,32 @@ fn table_velocity(world: &World, touch: &Touch, (from_s, to_s): (f64, f64)) -> V
 }
 
 /// `L^-1 J^T` of all rows.
-fn whiten_all(mass: &MassFactor, rows: &[Everything], whitened: &mut Vec<Everything>) {
+fn whiten_all(
+    mass: &MassFactor,
+    fingers: &[Option<usize>],
+    rows: &[Everything],
+    whitened: &mut Vec<Everything>,
+) {
     whitened.clear();
     whitened.extend_from_slice(rows);
-    for row in whitened {
-        mass.whiten(row);
+    for (row, finger) in whitened.iter_mut().zip(fingers) {
+        mass.whiten_branch(*finger, row);
     }
 }
 
 /// `tau J M^-1 J^T`.
-fn delassus(whitened: &[Everything], joints: usize, tau: f64, problem: &mut Problem) {
+fn delassus(
+    mass: &MassFactor,
+    fingers: &[Option<usize>],
+    whitened: &[Everything],
+    tau: f64,
+    problem: &mut Problem,
+) {
     let n = whitened.len();
     for (r, a) in whitened.iter().enumerate() {
         for (s, b) in whitened.iter().enumerate().take(r + 1) {
-            let entry = tau * (dot(&a.joints, &b.joints, joints) + dot(&a.object, &b.object, 6));
+            let common = if fingers[r] == fingers[s] { fingers[r] } else { None };
+            let entry = tau * mass.product(common, a, b);
             problem.delassus[r * n + s] = entry;
             problem.delassus[s * n + r] = entry;
         }

@@ -21,6 +21,9 @@ use super::material::Response;
 use blindgrasp_shared::math::Real;
 use nalgebra::{Matrix3, Vector3};
 
+#[cfg(test)]
+mod tests;
+
 /// Proximal term, relative to the mean of the tangential diagonal.
 const PROXIMAL: f64 = 1e-8;
 /// Linearizations of the normal forces in one step.

@@ -6,7 +6,7 @@
 
 use super::material::Material;
 use super::world::{Friction, World};
-use crate::mass::Everything;
+use crate::mass::{Branches, Everything};
 use crate::model::PlantModel;
 use blindgrasp_body::dynamics::{Body, JointMatrix, JointVector, mass_matrix, place_bodies};
 use blindgrasp_body::polyhedron::Convex;
@@ -52,6 +52,19 @@ pub enum Pair {
 }
 
 impl Pair {
+    /// The finger that the rows of a contact act on, if one does.
+    pub(super) fn finger(self, branches: &Branches) -> Option<usize> {
+        match self {
+            Self::FingertipObject { finger }
+            | Self::FingertipTable { finger, .. }
+            | Self::Torsion { finger } => Some(finger),
+            Self::ObjectTable { .. } => None,
+            Self::JointLimit { joint, .. } => {
+                branches.fingers.iter().position(|finger| finger.contains(&joint))
+            }
+        }
+    }
+
     pub(super) fn table(self) -> Option<usize> {
         match self {
             Self::FingertipTable { table, .. } | Self::ObjectTable { table, .. } => Some(table),

@@ -105,3 +105,38 @@ fn a_grasp_too_weak_slides_as_it_must() {
         );
     }
 }
+
+/// The normal force as an average along the path, against that of the rolling contact, which is frozen at the step: in a grasp
+/// that swings without slipping, since one finger pushes harder.
+///
+/// Tolerance: their difference falls with the square of the step, by a factor of 3.5 at least for each halving.
+#[test]
+fn an_average_along_the_path_differs_by_the_square_of_the_step() {
+    let mut coarser: Option<f64> = None;
+    for substep_s in [2e-4, 1e-4, 5e-5, 2.5e-5] {
+        let (mut plant, mut torques_nm) = grasp(3, 10.0, Vector3::zeros(), substep_s);
+        for friction in &mut plant.world.fingertip_friction {
+            *friction = Friction { sliding: 10.0, torsion_m: 0.0 };
+        }
+        torques_nm[0] *= 1.3;
+        let every = (2e-4 / substep_s).round() as u64;
+        let forces = |mut plant: Plant| {
+            let mut forces = vec![];
+            plant.run(&torques_nm, 0.04, |plant| {
+                if plant.steps.is_multiple_of(every) {
+                    forces.extend(plant.contacts().iter().map(|contact| contact.normal_n));
+                }
+            });
+            forces
+        };
+        let (average, frozen) = (forces(plant.clone()), forces(plant.compare_with_rolling()));
+        assert_eq!(average.len(), frozen.len() / 3);
+        let largest = average.iter().copied().fold(0.0, f64::max);
+        // Each fingertip's contact is followed by the two halves of its torsion.
+        let frozen = frozen.iter().step_by(3);
+        let off_n = average.iter().zip(frozen).fold(0.0f64, |off, (a, b)| off.max((a - b).abs()));
+        println!("step {substep_s}: {off_n:.1e} N of {largest:.2} N");
+        assert!(coarser.is_none_or(|coarser| coarser > 3.5 * off_n));
+        coarser = Some(off_n);
+    }
+}

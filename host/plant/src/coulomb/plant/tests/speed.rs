@@ -75,3 +75,53 @@ fn of_a_step() {
         );
     }
 }
+
+#[test]
+#[ignore = "a measurement"]
+fn of_its_parts() {
+    let (mut plant, torques_nm) = upright(1.0, vec![]);
+    let mut torques = [0.0; MAX_JOINTS];
+    torques[..12].copy_from_slice(&torques_nm);
+    plant.run(&torques_nm, 0.01, |_| {});
+    let time = |name: &str, work: &mut dyn FnMut(&mut Plant), plant: &mut Plant| {
+        let mut best_us = f64::INFINITY;
+        for _ in 0..50 {
+            let begun = Instant::now();
+            for _ in 0..100 {
+                work(plant);
+            }
+            best_us = best_us.min(begun.elapsed().as_secs_f64() * 1e4);
+        }
+        println!("{name}: {best_us:.2} us");
+    };
+    time("place", &mut |plant| plant.place(), &mut plant);
+    time(
+        "external forces",
+        &mut |plant| {
+            let (mut push, mut softness) = (Everything::ZERO, [0.0; MAX_JOINTS]);
+            plant.external_forces(&torques, 2.5e-4, &mut push, &mut softness);
+        },
+        &mut plant,
+    );
+    let object = plant.object_mass();
+    time(
+        "factorize",
+        &mut |plant| {
+            plant.mass.factorize(&plant.now.mass, &[0.0; MAX_JOINTS], &object);
+        },
+        &mut plant,
+    );
+    time("collect", &mut |plant| plant.collect(), &mut plant);
+    time("set problem", &mut |plant| plant.set_problem(2.5e-4, &Everything::ZERO), &mut plant);
+    time(
+        "powers",
+        &mut |plant| {
+            plant.power = plant.powers(&torques, 2.5e-4);
+        },
+        &mut plant,
+    );
+    time("report", &mut |plant| plant.report(), &mut plant);
+    time("solve", &mut |plant| plant.solve(&torques).unwrap(), &mut plant);
+    let mut clock = plant.clone();
+    time("hold", &mut |plant| plant.hold_what_sticks(), &mut clock);
+}
