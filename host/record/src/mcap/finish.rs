@@ -98,7 +98,7 @@ struct Copy {
 impl Copy {
     fn describe(&mut self, metadata: BTreeMap<String, String>) -> Result<(), RecordingError> {
         if let (Some(device), Some(json)) = (metadata.get(twin::DEVICE), metadata.get(twin::JSON))
-            && let Ok(about) = serde_json::from_str(json)
+            && let Ok(about) = serde_json::from_slice(json.as_bytes())
         {
             self.abouts.insert(device.clone(), about);
         }
