@@ -15,7 +15,8 @@
 
 use super::contact::Rows;
 use super::linear::{backward, factorize, forward};
-use super::mass::{Everything, MassFactor, OBJECT, dot};
+use super::mass::MassFactor;
+use super::vectors::{Everything, OBJECT, dot};
 use blindgrasp_body::{Hand, MAX_CHAIN, MAX_FINGERS};
 
 /// The size of the part that fingers share: the trunk's joints, then the object.

@@ -23,11 +23,12 @@ use super::contact::{Contact, Rows};
 use super::coupling::Coupling;
 use super::friction::{FrictionTorque, stretch, torque};
 use super::ledger::Flows;
-use super::mass::{Branches, Everything, ObjectMass};
+use super::mass::{Branches, ObjectMass};
 use super::model::{ContactForce, Lost, ModelError, Motion, PlantModel};
 use super::push::share;
 use super::rotation::{solve_inertia, turn_freely, world_inertia};
 use super::surroundings::Surroundings;
+use super::vectors::{Everything, combine, dot6, set_tail, set_velocities, tail, velocities};
 use blindgrasp_body::dynamics::{Body, JointMatrix, JointVector, bias_torques, mass_matrix, place_bodies};
 use blindgrasp_body::{MAX_CHAIN, MAX_FINGERS, MAX_JOINTS, Posture};
 use blindgrasp_shared::math::Real;
@@ -426,39 +427,4 @@ struct Pressed {
     scale: f64,
     /// Rate of indentation with the velocities before, m/s.
     rate_m_s: f64,
-}
-
-/// Velocities of a motion.
-fn velocities(motion: &Motion) -> Everything {
-    let (v, w) = (&motion.velocity_m_s, &motion.spin_rad_s);
-    Everything { joints: motion.speeds_rad_s, object: [v.x, v.y, v.z, w.x, w.y, w.z] }
-}
-
-fn set_velocities(motion: &mut Motion, v: &Everything) {
-    motion.speeds_rad_s = v.joints;
-    motion.velocity_m_s = Vector3::new(v.object[0], v.object[1], v.object[2]);
-    motion.spin_rad_s = tail(&v.object);
-}
-
-/// `a u + b v`.
-fn combine(a: f64, u: &Everything, b: f64, v: &Everything) -> Everything {
-    let mut sum = Everything::ZERO;
-    let joints = u.joints.iter().zip(&v.joints);
-    let object = u.object.iter().zip(&v.object);
-    for (sum, (u, v)) in sum.joints.iter_mut().chain(&mut sum.object).zip(joints.chain(object)) {
-        *sum = a * u + b * v;
-    }
-    sum
-}
-
-fn tail(v: &[f64; 6]) -> Vector3<f64> {
-    Vector3::new(v[3], v[4], v[5])
-}
-
-fn set_tail(v: &mut [f64; 6], w: &Vector3<f64>) {
-    v[3..].copy_from_slice(w.as_slice());
-}
-
-fn dot6(a: &[f64; 6], b: &[f64; 6]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| a * b).sum()
 }

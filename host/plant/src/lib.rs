@@ -16,6 +16,7 @@ pub mod model;
 mod push;
 mod rotation;
 mod surroundings;
+mod vectors;
 
 pub use integrator::Plant;
 pub use ledger::Flows;

@@ -1,13 +1,11 @@
 //! The mass matrix of hand and object, factored: block-arrow, since fingers meet only in the trunk.
 
 use super::linear::{backward, factorize, forward};
+use super::vectors::{Everything, OBJECT, dot};
 use blindgrasp_body::dynamics::{JointMatrix, JointVector};
-use blindgrasp_body::{Hand, MAX_CHAIN, MAX_FINGERS, MAX_JOINTS};
+use blindgrasp_body::{Hand, MAX_CHAIN, MAX_FINGERS};
 use blindgrasp_shared::math::Real;
 use nalgebra::Matrix3;
-
-/// Velocities of the object.
-pub(super) const OBJECT: usize = 6;
 
 /// The joints of the trunk and of each finger.
 #[derive(Clone, Debug)]
@@ -44,17 +42,6 @@ pub(super) struct ObjectMass {
     pub(super) mass_kg: f64,
     /// About the centre of mass, in base axes, kg m^2.
     pub(super) inertia_kg_m2: Matrix3<f64>,
-}
-
-/// Velocities or forces of everything.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Everything {
-    pub(super) joints: JointVector,
-    pub(super) object: [f64; OBJECT],
-}
-
-impl Everything {
-    pub(super) const ZERO: Self = Self { joints: [0.0; MAX_JOINTS], object: [0.0; OBJECT] };
 }
 
 /// The Cholesky factor `L` of the mass matrix. There is no fill between fingers.
@@ -199,13 +186,4 @@ impl MassFactor {
         }
         backward(&self.inertia_factor, 3, &mut y.object[3..]);
     }
-}
-
-#[inline]
-pub(super) fn dot(a: &[f64], b: &[f64], n: usize) -> f64 {
-    let mut sum = 0.0;
-    for (a, b) in a.iter().zip(b).take(n) {
-        sum += a * b;
-    }
-    sum
 }

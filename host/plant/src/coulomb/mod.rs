@@ -2,13 +2,15 @@
 //! with Coulomb friction.
 //!
 //! Fingertips and corners are soft along the normal, so touch, lift-off and impact are smooth; only friction is not. The
-//! parts: `touch` finds contacts and makes their rows, `material` has normal forces, `solve` finds the forces of one step,
-//! and [`Plant`] advances in time. [`World`] says what there is besides hand and object.
+//! parts: `touch` finds contacts and makes their rows, `material` has normal forces (`stiffness` says which), `solve` finds the
+//! forces of one step (`cone` those of one contact), and [`Plant`] advances in time. [`World`] says what there is besides hand and object.
 
+mod cone;
 mod linear;
 mod material;
 mod plant;
 mod solve;
+mod stiffness;
 mod touch;
 mod world;
 

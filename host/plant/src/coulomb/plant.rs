@@ -7,20 +7,22 @@
 //!   velocities after that step are projected, orthogonally in the metric of the kinetic energy, onto no slip of all
 //!   sticking contacts where these are half a step later. That only takes energy; it is booked as friction.
 
-use super::material::{Material, Response};
+use super::material::Response;
+
 use super::solve::{Counters, Problem};
-use super::touch::{Materials, Pair, Placed, Touch};
+use super::stiffness::{Materials, limits};
+use super::touch::{Pair, Placed, Touch};
 use super::world::{World, WorldError};
 use crate::friction::{FrictionTorque, stretch, torque};
 use crate::ledger::Flows;
-use crate::mass::{Branches, Everything, MassFactor, ObjectMass, dot};
+use crate::mass::{Branches, MassFactor, ObjectMass};
 use crate::model::{Lost, ModelError, Motion, PlantModel};
 use crate::push::share;
 use crate::rotation::{solve_inertia, turn_freely};
+use crate::vectors::{Everything, add, combine, dot, dot6, head, set_tail, set_velocities, tail, velocities};
 use blindgrasp_body::dynamics::{JointVector, bias_torques};
 use blindgrasp_body::polyhedron::Convex;
 use blindgrasp_body::{MAX_CHAIN, MAX_JOINTS, Posture};
-use blindgrasp_shared::math::Real;
 use nalgebra::Vector3;
 
 #[cfg(test)]
@@ -28,12 +30,6 @@ mod tests;
 
 /// The least relative pivot of a mass matrix.
 const LEAST_PIVOT: f64 = 1e-12;
-/// Stiffness of a corner of the object on a table, N/m: that of hard plastic on wood.
-const CORNER_N_M: f64 = 6e4;
-/// Stiffness of the end of a joint's range, N m/rad.
-const LIMIT_NM: f64 = 20.0;
-/// Damping of both, of critical.
-const DAMPING: f64 = 1.75;
 /// Gap that a contact may have and still be solved for, beyond what velocities close in two steps, m (or rad).
 const NEAR: f64 = 2e-4;
 /// Gap beyond which it is not even looked at, m.
@@ -119,11 +115,7 @@ impl Plant {
         }
         let shape = world.check(model.hand.fingertip_count(), &model.object.shape)?;
         let mut plant = Self {
-            materials: Materials {
-                fingertips: model.fingertips.iter().map(Material::of_fingertip).collect(),
-                corner: corner(&model, substep_s),
-                limits: Vec::new(),
-            },
+            materials: Materials::new(&model, substep_s),
             shape,
             substep_s,
             motion,
@@ -489,7 +481,7 @@ impl Plant {
             }
         }
         let object = &solution.object;
-        flows.pushes = self.pushed.iter().zip(object).map(|(force, speed)| force * speed).sum();
+        flows.pushes = dot6(&self.pushed, object);
         flows.weight += model.object.mass_kg * object_gravity.dot(&head(object));
         flows.velocity_squared = head(object).norm_squared();
         flows.spin_squared = tail(object).norm_squared();
@@ -662,79 +654,7 @@ fn delassus(
     }
 }
 
-/// The material of the object's corners on a table: as stiff as the step resolves, with damping by the object's mass.
-///
-/// It is one for all corners and the whole run, so that their energy is a potential: `n` corners of a face at once, each with
-/// `h^2 k n (J M^-1 J^T) <= 1` in any direction, stay within what the leapfrog resolves.
-fn corner(model: &PlantModel, step_s: f64) -> Material {
-    let object = &model.object;
-    let corners = object.shape.faces.iter().map(|face| face.corners.len()).max().unwrap_or(1) as f64;
-    let inverse = object.inertia_kg_m2.try_inverse().unwrap_or_default();
-    let yields = |vertex_m: &Vector3<f64>| {
-        let lever = vertex_m.cross_matrix();
-        // The trace is above the largest eigenvalue.
-        1.0 / object.mass_kg + (lever * inverse * lever.transpose()).trace()
-    };
-    let most = object.shape.vertices_m.iter().map(yields).fold(0.0, f64::max);
-    let stiffness_n_m = CORNER_N_M.min(1.0 / (corners * step_s * step_s * most));
-    let critical_n_s_m = 2.0 * (stiffness_n_m * object.mass_kg / corners).square_root();
-    Material::spring(stiffness_n_m, DAMPING * critical_n_s_m)
-}
-
-/// The materials of the ends of the joints' ranges, by the joints' inertia at the start.
-fn limits(mass: &MassFactor, joints: usize, step_s: f64) -> Vec<Material> {
-    let limit = |joint: usize| {
-        let mut row = Everything::ZERO;
-        row.joints[joint] = 1.0;
-        mass.whiten(&mut row);
-        let inertia_kg_m2 = 1.0 / times(&row, &row);
-        // A quarter, since the inertia changes with the posture.
-        let stiffness_nm = LIMIT_NM.min(0.25 * inertia_kg_m2 / (step_s * step_s));
-        Material::spring(stiffness_nm, DAMPING * 2.0 * (stiffness_nm * inertia_kg_m2).square_root())
-    };
-    (0..joints).map(limit).collect()
-}
-
-/// Velocities of a motion.
-fn velocities(motion: &Motion) -> Everything {
-    let (v, w) = (&motion.velocity_m_s, &motion.spin_rad_s);
-    Everything { joints: motion.speeds_rad_s, object: [v.x, v.y, v.z, w.x, w.y, w.z] }
-}
-
-fn set_velocities(motion: &mut Motion, v: &Everything) {
-    motion.speeds_rad_s = v.joints;
-    motion.velocity_m_s = head(&v.object);
-    motion.spin_rad_s = tail(&v.object);
-}
-
-/// `a u + b v`.
-fn combine(a: f64, u: &Everything, b: f64, v: &Everything) -> Everything {
-    let mut sum = Everything::ZERO;
-    add(&mut sum, a, u);
-    add(&mut sum, b, v);
-    sum
-}
-
-/// Adds `a v`.
-fn add(sum: &mut Everything, a: f64, v: &Everything) {
-    for (sum, v) in sum.joints.iter_mut().chain(&mut sum.object).zip(v.joints.iter().chain(&v.object)) {
-        *sum += a * v;
-    }
-}
-
 /// Product of a row with velocities; or, once both are whitened, with forces.
 fn times(row: &Everything, v: &Everything) -> f64 {
     dot(&row.joints, &v.joints, MAX_JOINTS) + dot(&row.object, &v.object, 6)
-}
-
-fn head(v: &[f64; 6]) -> Vector3<f64> {
-    Vector3::new(v[0], v[1], v[2])
-}
-
-fn tail(v: &[f64; 6]) -> Vector3<f64> {
-    Vector3::new(v[3], v[4], v[5])
-}
-
-fn set_tail(v: &mut [f64; 6], w: &Vector3<f64>) {
-    v[3..].copy_from_slice(w.as_slice());
 }

@@ -16,10 +16,9 @@
 //! regular and shares the load out in proportion to the normal forces; one refinement takes its effect on the velocities
 //! away.
 
+use super::cone::{into_ball, length, one_contact};
 use super::linear::{cholesky, cholesky_solve, dot, eliminate};
 use super::material::Response;
-use blindgrasp_shared::math::Real;
-use nalgebra::{Matrix3, Vector3};
 
 #[cfg(test)]
 mod tests;
@@ -74,7 +73,7 @@ impl Place {
         self.normal + 1..self.normal + 1 + self.tangents
     }
 
-    /// The diagonal entry `W_nn + 1/s` and the right-hand side `a/s - b_n` of a pressed contact.
+    /// `1/s`: a pressed contact has `c_n + l_n / s = a / s`.
     fn softness(&self) -> f64 {
         1.0 / self.s
     }
@@ -477,6 +476,10 @@ impl Problem {
         for k in 0..self.places.len() {
             let place = self.places[k];
             let all = place.normal..place.normal + 1 + place.tangents;
+            if !place.is_soft() {
+                self.forces[all].fill(0.0);
+                continue;
+            }
             let n = self.count;
             // Velocities of its rows without its own forces.
             let mut free = [0.0; 4];
@@ -493,85 +496,10 @@ impl Problem {
                 own[i + 1][i + 1] += place.proximal;
                 free[i + 1] -= place.proximal * self.forces[r];
             }
-            let forces = one_contact(&place, &own, &free);
+            own[0][0] += place.softness();
+            free[0] -= place.a * place.softness();
+            let forces = one_contact(&own, &free, place.tangents, place.friction);
             self.forces[all.clone()].copy_from_slice(&forces[..all.len()]);
-        }
-    }
-}
-
-/// The exact solution of one contact: normal force first, then tangential ones.
-fn one_contact(place: &Place, own: &[[f64; 4]; 4], free: &[f64; 4]) -> [f64; 4] {
-    let mut forces = [0.0; 4];
-    if !place.is_soft() || !(place.a - place.s * free[0] > 0.0) && place.tangents == 0 {
-        return forces;
-    }
-    // l_n = alpha - beta . l_t
-    let diagonal = own[0][0] + place.softness();
-    let alpha = (place.a * place.softness() - free[0]) / diagonal;
-    if !(alpha > 0.0) {
-        return forces;
-    }
-    if place.tangents == 0 {
-        forces[0] = alpha;
-        return forces;
-    }
-    let beta = Vector3::new(own[0][1], own[0][2], own[0][3]) / diagonal;
-    let mut s = Matrix3::identity();
-    let mut right = Vector3::zeros();
-    for i in 0..place.tangents {
-        for j in 0..place.tangents {
-            s[(i, j)] = own[i + 1][j + 1] - own[i + 1][0] * beta[j];
-        }
-        right[i] = -(free[i + 1] + own[i + 1][0] * alpha);
-    }
-    // (S + kappa) l_t = right, with the least kappa for which l_t is in its ball: the secular equation of trust regions,
-    // 1 / |l_t| - 1 / radius = 0, which is nearly linear in kappa.
-    let solve = |kappa: f64| {
-        let inverse = (s + Matrix3::from_diagonal_element(kappa)).try_inverse().unwrap_or_default();
-        let tangential = inverse * right;
-        let radius = place.friction * (alpha - beta.dot(&tangential));
-        let squared = tangential.norm_squared();
-        let excess = squared.square_root() - radius;
-        let step = squared / tangential.dot(&(inverse * tangential)) * excess / radius;
-        (tangential, excess, if radius > 0.0 { kappa + step } else { f64::NAN })
-    };
-    let (mut tangential, mut excess, mut next) = solve(0.0);
-    if excess > 0.0 {
-        let (mut low, mut high, mut kappa) = (0.0, f64::INFINITY, 0.0);
-        for _ in 0..100 {
-            kappa = if next > low && next < high {
-                next
-            } else if high.is_finite() {
-                0.5 * (low + high)
-            } else {
-                4.0 * kappa + s.trace()
-            };
-            (tangential, excess, next) = solve(kappa);
-            if excess > 0.0 {
-                low = kappa
-            } else {
-                high = kappa
-            }
-            if excess.abs() <= 1e-14 * place.friction * alpha || high - low <= 1e-15 * high {
-                break;
-            }
-        }
-    }
-    forces[0] = (alpha - beta.dot(&tangential)).max(0.0);
-    forces[1..].copy_from_slice(tangential.as_slice());
-    forces
-}
-
-fn length(v: &[f64]) -> f64 {
-    v.iter().map(|v| v * v).sum::<f64>().square_root()
-}
-
-/// Shortens a vector to a radius.
-fn into_ball(v: &mut [f64], radius: f64) {
-    let long = length(v);
-    if long > radius {
-        for v in v {
-            *v *= radius / long;
         }
     }
 }

@@ -5,9 +5,11 @@
 //! points at the contact: Eq. 10 on a face. All corners of an object on a table are taken on the table's own plane.
 
 use super::material::Material;
+use super::stiffness::Materials;
 use super::world::{Friction, World};
-use crate::mass::{Branches, Everything};
+use crate::mass::Branches;
 use crate::model::PlantModel;
+use crate::vectors::Everything;
 use blindgrasp_body::dynamics::{Body, JointMatrix, JointVector, mass_matrix, place_bodies};
 use blindgrasp_body::polyhedron::Convex;
 use blindgrasp_body::{FingertipModel, MAX_JOINTS, Posture};
@@ -134,14 +136,6 @@ impl Touch {
     pub(super) fn torsion_length_m(&self) -> f64 {
         self.friction.torsion_m / self.friction.sliding
     }
-}
-
-/// Materials, prepared once.
-#[derive(Clone, Debug)]
-pub(super) struct Materials {
-    pub(super) fingertips: Vec<Material>,
-    pub(super) corner: Material,
-    pub(super) limits: Vec<Material>,
 }
 
 /// Positions of everything at one instant, and what follows from them.

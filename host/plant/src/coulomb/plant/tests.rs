@@ -13,6 +13,7 @@ use crate::coulomb::{Friction, Path, Table};
 use blindgrasp_body::polyhedron::Polyhedron;
 use blindgrasp_body::{FingertipModel, Hand, JointFriction};
 use blindgrasp_shared::hand::{Fingertip, Joint, Link};
+use blindgrasp_shared::math::Real;
 use nalgebra::{Matrix3, UnitQuaternion};
 
 const GRAVITY_M_S2: f64 = 9.81;

@@ -2,6 +2,7 @@
 
 use super::*;
 use crate::coulomb::plant::tests::tables::cube;
+use crate::coulomb::stiffness::corner;
 
 /// What is compared: object's position, m, and attitude, as a rotation vector times 3 cm; and joint angles times 3 cm.
 fn state(plant: &Plant) -> Vec<f64> {

@@ -1,6 +1,7 @@
 //! A free object and tables.
 
 use super::*;
+use crate::coulomb::stiffness::corner;
 
 const SIDE_M: f64 = 0.048;
 const MASS_KG: f64 = 0.045;

@@ -1,0 +1,67 @@
+//! The materials of all contacts of a plant: as stiff as they are, or as the step resolves.
+
+use super::material::Material;
+use crate::mass::MassFactor;
+use crate::model::PlantModel;
+use crate::vectors::{Everything, dot};
+use blindgrasp_body::MAX_JOINTS;
+use blindgrasp_shared::math::Real;
+use nalgebra::Vector3;
+
+/// Stiffness of a corner of the object on a table, N/m: that of hard plastic on wood.
+const CORNER_N_M: f64 = 6e4;
+/// Stiffness of the end of a joint's range, N m/rad.
+const LIMIT_NM: f64 = 20.0;
+/// Damping of both, of critical.
+const DAMPING: f64 = 1.75;
+/// Materials, prepared once.
+#[derive(Clone, Debug)]
+pub(super) struct Materials {
+    pub(super) fingertips: Vec<Material>,
+    pub(super) corner: Material,
+    pub(super) limits: Vec<Material>,
+}
+
+impl Materials {
+    /// Of a model without joint limits.
+    pub(super) fn new(model: &PlantModel, step_s: f64) -> Self {
+        Self {
+            fingertips: model.fingertips.iter().map(Material::of_fingertip).collect(),
+            corner: corner(model, step_s),
+            limits: Vec::new(),
+        }
+    }
+}
+
+/// The material of the object's corners on a table: as stiff as the step resolves, with damping by the object's mass.
+///
+/// It is one for all corners and the whole run, so that their energy is a potential: `n` corners of a face at once, each with
+/// `h^2 k n (J M^-1 J^T) <= 1` in any direction, stay within what the leapfrog resolves.
+pub(super) fn corner(model: &PlantModel, step_s: f64) -> Material {
+    let object = &model.object;
+    let corners = object.shape.faces.iter().map(|face| face.corners.len()).max().unwrap_or(1) as f64;
+    let inverse = object.inertia_kg_m2.try_inverse().unwrap_or_default();
+    let yields = |vertex_m: &Vector3<f64>| {
+        let lever = vertex_m.cross_matrix();
+        // The trace is above the largest eigenvalue.
+        1.0 / object.mass_kg + (lever * inverse * lever.transpose()).trace()
+    };
+    let most = object.shape.vertices_m.iter().map(yields).fold(0.0, f64::max);
+    let stiffness_n_m = CORNER_N_M.min(1.0 / (corners * step_s * step_s * most));
+    let critical_n_s_m = 2.0 * (stiffness_n_m * object.mass_kg / corners).square_root();
+    Material::spring(stiffness_n_m, DAMPING * critical_n_s_m)
+}
+
+/// The materials of the ends of the joints' ranges, by the joints' inertia at the start.
+pub(super) fn limits(mass: &MassFactor, joints: usize, step_s: f64) -> Vec<Material> {
+    let limit = |joint: usize| {
+        let mut row = Everything::ZERO;
+        row.joints[joint] = 1.0;
+        mass.whiten(&mut row);
+        let inertia_kg_m2 = 1.0 / dot(&row.joints, &row.joints, MAX_JOINTS);
+        // A quarter, since the inertia changes with the posture.
+        let stiffness_nm = LIMIT_NM.min(0.25 * inertia_kg_m2 / (step_s * step_s));
+        Material::spring(stiffness_nm, DAMPING * 2.0 * (stiffness_nm * inertia_kg_m2).square_root())
+    };
+    (0..joints).map(limit).collect()
+}
