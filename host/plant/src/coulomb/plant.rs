@@ -19,14 +19,18 @@ use crate::mass::{Branches, MassFactor, ObjectMass};
 use crate::model::{Lost, ModelError, Motion, PlantModel};
 use crate::push::share;
 use crate::rotation::{solve_inertia, turn_freely};
-use crate::vectors::{Everything, add, combine, dot, dot6, head, set_tail, set_velocities, tail, velocities};
+use crate::vectors::{Everything, add, combine, dot, head, set_tail, set_velocities, tail, velocities};
 use blindgrasp_body::dynamics::{JointVector, bias_torques};
 use blindgrasp_body::polyhedron::Convex;
 use blindgrasp_body::{MAX_CHAIN, MAX_JOINTS, Posture};
 use nalgebra::Vector3;
 
+mod account;
+mod hold;
 #[cfg(test)]
 mod tests;
+
+pub use account::Contact;
 
 /// The least relative pivot of a mass matrix.
 const LEAST_PIVOT: f64 = 1e-12;
@@ -34,25 +38,6 @@ const LEAST_PIVOT: f64 = 1e-12;
 const NEAR: f64 = 2e-4;
 /// Gap beyond which it is not even looked at, m.
 const FAR_M: f64 = 0.01;
-
-/// A contact's force at one instant.
-#[derive(Clone, Copy, Debug)]
-pub struct Contact {
-    /// The bodies and the geometry.
-    pub touch: Touch,
-    /// Normal force, N: on the second body along the normal. N m at the end of a joint's range.
-    pub normal_n: f64,
-    /// Force along the tangents on the second body, N.
-    pub tangential_n: [f64; 2],
-    /// Torsional torque on the second body along the normal, N m.
-    pub torsion_nm: f64,
-    /// Velocities of the second body against the first: opening of the gap, slip along the tangents, m/s.
-    pub velocity_m_s: [f64; 3],
-    /// Torsion, rad/s.
-    pub torsion_rad_s: f64,
-    /// Its force is inside of the limit of friction.
-    pub sticks: bool,
-}
 
 /// The plant, stepped in time.
 #[derive(Clone, Debug)]
@@ -435,161 +420,6 @@ impl Plant {
             *free += tau * mass.product(*finger, row, push);
         }
         delassus(mass, fingers, whitened, tau, problem);
-    }
-
-    /// Powers at this instant, with the velocities that were solved for.
-    fn powers(&self, torques_nm: &JointVector, tau: f64) -> Flows {
-        let mut flows = Flows::NONE;
-        let Self { model, solution, .. } = self;
-        let [hand_gravity, object_gravity] = &self.gravity_m_s2;
-        let weight_nm = model.hand.gravity_torques(&self.now.posture, hand_gravity);
-        for (k, speed) in solution.joints.iter().enumerate().take(model.hand.joint_count()) {
-            // As in `external_forces`, with the part that is implicit.
-            let FrictionTorque { torque_nm, damping_nm_s, stiffness_nm } = self.friction[k];
-            let friction_nm =
-                torque_nm + damping_nm_s * speed + tau * stiffness_nm * (speed - self.before.joints[k]);
-            flows.motors += torques_nm[k] * speed;
-            flows.friction += friction_nm * speed;
-            flows.weight -= weight_nm[k] * speed;
-            flows.joint_speeds_squared[k] = speed * speed;
-        }
-        let Problem { forces, velocities, .. } = &self.problem;
-        let mut r = 0;
-        for (k, touch) in self.touches.iter().enumerate() {
-            let rate = -velocities[r];
-            let law = respond(
-                touch,
-                self.rates_m_s[k],
-                rate,
-                (self.path_s(), tau),
-                (self.started, self.as_rolling),
-            );
-            let damped = (forces[r] - law.elastic_n) * rate;
-            match touch.pair {
-                Pair::JointLimit { .. } => flows.friction += damped,
-                Pair::Torsion { .. } => flows.torsion += damped,
-                _ => flows.indentation += damped,
-            }
-            let table_m_s = self.table_velocity_now(touch);
-            for part in 0..=touch.tangents() {
-                if part > 0 {
-                    flows.slip -= forces[r] * velocities[r];
-                }
-                // The table is the second body: what it takes from it is the negative of the force on it.
-                flows.tables -= forces[r] * touch.along(part, &table_m_s);
-                r += 1;
-            }
-        }
-        let object = &solution.object;
-        flows.pushes = dot6(&self.pushed, object);
-        flows.weight += model.object.mass_kg * object_gravity.dot(&head(object));
-        flows.velocity_squared = head(object).norm_squared();
-        flows.spin_squared = tail(object).norm_squared();
-        flows
-    }
-
-    fn table_velocity_now(&self, touch: &Touch) -> Vector3<f64> {
-        let (t_s, h) = (self.time_s(), self.substep_s);
-        table_velocity(&self.world, touch, (if self.started { t_s - h } else { t_s }, t_s + h))
-    }
-
-    /// Makes the list of contacts with their forces.
-    fn report(&mut self) {
-        let Self { touches, problem, contacts, .. } = self;
-        contacts.clear();
-        let mut r = 0;
-        for (k, touch) in touches.iter().enumerate() {
-            let mut contact = Contact {
-                touch: *touch,
-                normal_n: problem.forces[r],
-                tangential_n: [0.0; 2],
-                torsion_nm: 0.0,
-                velocity_m_s: [problem.velocities[r], 0.0, 0.0],
-                torsion_rad_s: 0.0,
-                sticks: problem.sticking(k).is_some(),
-            };
-            for part in 1..=touch.tangents() {
-                let (force, velocity) = (problem.forces[r + part], problem.velocities[r + part]);
-                if part < 3 {
-                    contact.tangential_n[part - 1] = force;
-                    contact.velocity_m_s[part] = velocity;
-                } else {
-                    contact.torsion_nm = force * touch.torsion_length_m();
-                    contact.torsion_rad_s = velocity / touch.torsion_length_m();
-                }
-            }
-            contacts.push(contact);
-            r += 1 + touch.tangents();
-        }
-    }
-
-    /// Where a contact begins to stick: projects the velocities of the half step ahead onto no slip of all that stick.
-    fn hold_what_sticks(&mut self) {
-        let begins = self.contacts.iter().any(|c| c.sticks && !self.stuck.contains(&c.touch.pair));
-        self.stuck.clear();
-        self.stuck.extend(self.contacts.iter().filter(|c| c.sticks).map(|c| c.touch.pair));
-        if !begins || self.as_rolling {
-            return;
-        }
-        let (h, t_s) = (self.substep_s, self.time_s());
-        let Self { ahead, model, world, shape, materials, motion, before, spin_momentum, stuck, .. } = self;
-        let mut angles_rad = motion.angles_rad;
-        for (angle, speed) in angles_rad.iter_mut().zip(&before.joints) {
-            *angle += 0.5 * h * speed;
-        }
-        let inertia = &model.object.inertia_kg_m2;
-        let attitude = turn_freely(&motion.attitude, inertia, spin_momentum, 0.5 * h);
-        let position_m = motion.position_m + 0.5 * h * head(&before.object);
-        ahead.place(model, &world.rotor_inertia_kg_m2, &angles_rad, position_m, attitude);
-        let inertia_kg_m2 = ahead.inertia_kg_m2(model);
-        let mut half = *before;
-        set_tail(&mut half.object, &solve_inertia(&inertia_kg_m2, spin_momentum));
-
-        let Self { touches, fingers, rows, whitened, mass, problem, projection, .. } = self;
-        touches.clear();
-        ahead.touches((model, world), (shape, materials), t_s + 0.5 * h, f64::INFINITY, |touch| {
-            if stuck.contains(&touch.pair) {
-                touches.push(touch);
-            }
-        });
-        rows.clear();
-        fingers.clear();
-        projection.clear();
-        for touch in touches.iter() {
-            for part in 1..=touch.tangents() {
-                projection.add(0, 0.0);
-                rows.push(ahead.row(model, touch, part));
-                fingers.push(touch.pair.finger(&mass.branches));
-            }
-        }
-        projection.make_room();
-        let mut r = 0;
-        for touch in touches.iter() {
-            let table_m_s = table_velocity(world, touch, (t_s, t_s + h));
-            for part in 1..=touch.tangents() {
-                projection.velocities[r] = touch.along(part, &table_m_s);
-                projection.free[r] = times(&rows[r], &half) + projection.velocities[r];
-                r += 1;
-            }
-        }
-        let object = ObjectMass { mass_kg: model.object.mass_kg, inertia_kg_m2 };
-        if !(mass.factorize(&ahead.mass, &[0.0; MAX_JOINTS], &object) > LEAST_PIVOT) {
-            return;
-        }
-        whiten_all(mass, fingers, rows, whitened);
-        delassus(mass, fingers, whitened, 1.0, projection);
-        let Some(lost_j) = projection.project() else { return };
-        problem.counters.projections += 1;
-        let mut change = Everything::ZERO;
-        for (row, impulse) in whitened.iter().zip(&projection.forces) {
-            add(&mut change, *impulse, row);
-        }
-        mass.unwhiten(&mut change);
-        add(before, 1.0, &change);
-        *spin_momentum += inertia_kg_m2 * tail(&change.object);
-        self.work.slip += lost_j;
-        let tables: f64 = projection.forces.iter().zip(&projection.velocities).map(|(l, v)| l * v).sum();
-        self.work.tables -= tables;
     }
 }
 

@@ -132,3 +132,51 @@ impl World {
         Convex::of(shape).ok_or(WorldError::NotConvex)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use blindgrasp_body::polyhedron::Flatness;
+    use blindgrasp_meshes::bracket;
+
+    fn world() -> World {
+        World { fingertip_friction: vec![Friction { sliding: 0.6, torsion_m: 0.002 }; 3], ..World::default() }
+    }
+
+    fn said(change: impl Fn(&mut World)) -> String {
+        let mut world = world();
+        change(&mut world);
+        let cube = Polyhedron::cuboid([0.05; 3]).unwrap();
+        world.check(3, &cube).map_or_else(|error| error.to_string(), |_| "fine".to_owned())
+    }
+
+    #[test]
+    fn what_is_wrong_is_told() {
+        let table = |normal: Vector3<f64>| Table {
+            point_m: Path::constant(Vector3::zeros()),
+            normal,
+            object_friction: 0.5,
+            fingertip_friction: Friction::default(),
+        };
+        assert_eq!(said(|_| {}), "fine");
+        assert_eq!(said(|world| world.tables.push(table(Vector3::z()))), "fine");
+        assert_eq!(
+            said(|world| world.fingertip_friction.truncate(2)),
+            "there are 2 frictions for 3 fingertips: give one each"
+        );
+        for (value, number) in [(-0.1, "-0.1"), (f64::INFINITY, "inf"), (f64::NAN, "NaN")] {
+            assert_eq!(
+                said(|world| world.fingertip_friction[1].sliding = value),
+                format!("a coefficient of friction is {number}: it has to be finite and not negative")
+            );
+        }
+        assert_eq!(
+            said(|world| world.tables.push(table(Vector3::new(0.0, 1.0, 1.0)))),
+            "the normal of table 1 is not a unit vector"
+        );
+        let (vertices, triangles) = bracket();
+        let flatness = Flatness { angle_rad: 1e-3, distance_m: 1e-6 };
+        let bracket = Polyhedron::mesh(&vertices, &triangles, &flatness).unwrap();
+        assert_eq!(world().check(3, &bracket).unwrap_err(), WorldError::NotConvex);
+    }
+}
