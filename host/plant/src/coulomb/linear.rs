@@ -73,7 +73,16 @@ pub(super) fn eliminate(a: &mut [f64], n: usize, b: &mut [f64]) -> bool {
 /// Scalar product.
 #[inline]
 pub(super) fn dot(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| a * b).sum()
+    // Four sums that do not wait for each other.
+    let mut sums = [0.0; 4];
+    let (mut a, mut b) = (a.chunks_exact(4), b[..a.len()].chunks_exact(4));
+    for (a, b) in a.by_ref().zip(b.by_ref()) {
+        for k in 0..4 {
+            sums[k] += a[k] * b[k];
+        }
+    }
+    let rest: f64 = a.remainder().iter().zip(b.remainder()).map(|(a, b)| a * b).sum();
+    (sums[0] + sums[1]) + (sums[2] + sums[3]) + rest
 }
 
 #[cfg(test)]

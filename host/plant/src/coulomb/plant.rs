@@ -63,11 +63,10 @@ pub struct Plant {
     now: Placed,
     ahead: Placed,
     mass: MassFactor,
-    /// Contacts at this instant; their rows, which are zero in all fingers but one; and these times the inverse factor of the
-    /// mass matrix.
+    /// Contacts at this instant; their rows, times the inverse factor of the mass matrix; and the only finger in which each is
+    /// not zero.
     touches: Vec<Touch>,
     fingers: Vec<Option<usize>>,
-    rows: Vec<Everything>,
     whitened: Vec<Everything>,
     /// Rates of the contacts' depths half a step ago; and about now, with velocities extrapolated.
     rates_m_s: Vec<f64>,
@@ -115,7 +114,6 @@ impl Plant {
             mass: MassFactor::new(&model.hand),
             touches: Vec::new(),
             fingers: Vec::new(),
-            rows: Vec::new(),
             whitened: Vec::new(),
             rates_m_s: Vec::new(),
             guesses_m_s: Vec::new(),
@@ -389,35 +387,30 @@ impl Plant {
         let (t_s, h) = (self.time_s(), self.substep_s);
         let around_s = if self.started { (t_s - h, t_s + h) } else { (t_s, t_s + h) };
         let about_now = velocities(&self.motion);
-        let Self { now, model, world, touches, fingers, rows, whitened, mass, problem, before, .. } = self;
-        self.guesses_m_s.clear();
+        let Self { now, model, world, touches, fingers, whitened, mass, problem, before, .. } = self;
         problem.clear();
-        rows.clear();
+        self.guesses_m_s.clear();
+        whitened.clear();
         fingers.clear();
         for touch in touches.iter() {
             problem.add(touch.tangents(), touch.friction.sliding);
-            for part in 0..=touch.tangents() {
-                rows.push(now.row(model, touch, part));
-                fingers.push(touch.pair.finger(&mass.branches));
-            }
         }
         problem.make_room();
-        let mut r = 0;
         for touch in touches.iter() {
+            let finger = touch.pair.finger(&mass.branches);
             let table_m_s = table_velocity(world, touch, around_s);
             for part in 0..=touch.tangents() {
+                let mut row = now.row(model, touch, part);
                 let along_m_s = touch.along(part, &table_m_s);
                 if part == 0 {
-                    let gap_m_s = mass.product(fingers[r], &rows[r], &about_now) + along_m_s;
-                    self.guesses_m_s.push(-gap_m_s);
+                    self.guesses_m_s.push(-mass.product(finger, &row, &about_now) - along_m_s);
                 }
-                problem.free[r] = mass.product(fingers[r], &rows[r], before) + along_m_s;
-                r += 1;
+                let before_m_s = mass.product(finger, &row, before) + along_m_s;
+                mass.whiten_branch(finger, &mut row);
+                problem.free[whitened.len()] = before_m_s + tau * mass.product(finger, &row, push);
+                whitened.push(row);
+                fingers.push(finger);
             }
-        }
-        whiten_all(mass, fingers, rows, whitened);
-        for ((free, row), finger) in problem.free.iter_mut().zip(whitened.iter()).zip(fingers.iter()) {
-            *free += tau * mass.product(*finger, row, push);
         }
         delassus(mass, fingers, whitened, tau, problem);
     }
@@ -449,20 +442,6 @@ fn table_velocity(world: &World, touch: &Touch, (from_s, to_s): (f64, f64)) -> V
         let point_m = &world.tables[table].point_m;
         (point_m.at(to_s) - point_m.at(from_s)) / (to_s - from_s)
     })
-}
-
-/// `L^-1 J^T` of all rows.
-fn whiten_all(
-    mass: &MassFactor,
-    fingers: &[Option<usize>],
-    rows: &[Everything],
-    whitened: &mut Vec<Everything>,
-) {
-    whitened.clear();
-    whitened.extend_from_slice(rows);
-    for (row, finger) in whitened.iter_mut().zip(fingers) {
-        mass.whiten_branch(*finger, row);
-    }
 }
 
 /// `tau J M^-1 J^T`.

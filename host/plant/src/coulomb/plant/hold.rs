@@ -1,6 +1,6 @@
 //! The projection of velocities where contacts begin to stick.
 
-use super::{LEAST_PIVOT, Plant, delassus, table_velocity, times, whiten_all};
+use super::{LEAST_PIVOT, Plant, delassus, table_velocity};
 use crate::mass::ObjectMass;
 use crate::rotation::{solve_inertia, turn_freely};
 use crate::vectors::{Everything, add, head, set_tail, tail};
@@ -29,38 +29,38 @@ impl Plant {
         let mut half = *before;
         set_tail(&mut half.object, &solve_inertia(&inertia_kg_m2, spin_momentum));
 
-        let Self { touches, fingers, rows, whitened, mass, problem, projection, .. } = self;
+        let Self { touches, fingers, whitened, mass, problem, projection, .. } = self;
         touches.clear();
         ahead.touches((model, world), (shape, materials), t_s + 0.5 * h, f64::INFINITY, |touch| {
             if stuck.contains(&touch.pair) {
                 touches.push(touch);
             }
         });
-        rows.clear();
-        fingers.clear();
-        projection.clear();
-        for touch in touches.iter() {
-            for part in 1..=touch.tangents() {
-                projection.add(0, 0.0);
-                rows.push(ahead.row(model, touch, part));
-                fingers.push(touch.pair.finger(&mass.branches));
-            }
-        }
-        projection.make_room();
-        let mut r = 0;
-        for touch in touches.iter() {
-            let table_m_s = table_velocity(world, touch, (t_s, t_s + h));
-            for part in 1..=touch.tangents() {
-                projection.velocities[r] = touch.along(part, &table_m_s);
-                projection.free[r] = times(&rows[r], &half) + projection.velocities[r];
-                r += 1;
-            }
-        }
         let object = ObjectMass { mass_kg: model.object.mass_kg, inertia_kg_m2 };
         if !(mass.factorize(&ahead.mass, &[0.0; MAX_JOINTS], &object) > LEAST_PIVOT) {
             return;
         }
-        whiten_all(mass, fingers, rows, whitened);
+        whitened.clear();
+        fingers.clear();
+        projection.clear();
+        for touch in touches.iter() {
+            (0..touch.tangents()).for_each(|_| {
+                projection.add(0, 0.0);
+            });
+        }
+        projection.make_room();
+        for touch in touches.iter() {
+            let finger = touch.pair.finger(&mass.branches);
+            let table_m_s = table_velocity(world, touch, (t_s, t_s + h));
+            for part in 1..=touch.tangents() {
+                let (mut row, r) = (ahead.row(model, touch, part), whitened.len());
+                projection.velocities[r] = touch.along(part, &table_m_s);
+                projection.free[r] = mass.product(finger, &row, &half) + projection.velocities[r];
+                mass.whiten_branch(finger, &mut row);
+                whitened.push(row);
+                fingers.push(finger);
+            }
+        }
         delassus(mass, fingers, whitened, 1.0, projection);
         let Some(lost_j) = projection.project() else { return };
         problem.counters.projections += 1;
