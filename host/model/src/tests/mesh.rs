@@ -1,5 +1,6 @@
 //! Objects whose shape is a mesh file: what is shipped, and what an object's file may say of its mesh.
 
+use super::cases::cases;
 use crate::file::ShapeFile;
 use crate::mesh::{Unit, load};
 use crate::{ObjectFile, Scene, object};
@@ -97,53 +98,8 @@ fn what_an_object_says_of_its_mesh_is_checked() {
         let error = ObjectFile::load(path.to_str().unwrap()).expect_err("has to be refused").to_string();
         error.strip_prefix(&format!("{}:", path.display())).expect("the place").to_owned()
     };
-    for (lines, expected) in [
-        (
-            "file = \"part.stl\"",
-            "5: shape.mesh.unit: is missing; add unit = \"mm\" if it measures 60 x 40 x 30 mm, unit = \"cm\" if it measures \
-             600 x 400 x 300 mm, unit = \"m\" if it measures 60000 x 40000 x 30000 mm, unit = \"in\" if it measures 1524 x 1016 \
-             x 762 mm",
-        ),
-        ("file = \"part.stl\"\nunit = \"inch\"", "6: shape.mesh.unit: `inch` is unknown; did you mean `in`?"),
-        ("file = \"part.stl\"\nunit = 1", "6: shape.mesh.unit: is not a name; write unit = \"mm\""),
-        ("file = 3\nunit = \"mm\"", "5: shape.mesh.file: is not a name; write file = \"part.stl\""),
-        (
-            "file = \"part.stl\"\nunit = \"mm\"\nscale = 0",
-            "7: shape.mesh.scale: 0.0 is out of range; has to be between 1e-6 and 1000000.0",
-        ),
-        (
-            "file = \"part.stl\"\nunit = \"mm\"\nscale = \"1\"",
-            "7: shape.mesh.scale: is not a number; write scale = 1.0",
-        ),
-        (
-            "file = \"part.stl\"\nunit = \"mm\"\ntriangles = []",
-            "5: shape.mesh.triangles: is given beside a file; leave one out",
-        ),
-        (
-            "file = \"part.stl\"\nunit = \"mm\"\nflat = 1",
-            "7: shape.mesh.flat: unknown key; did you mean `flat_m`?",
-        ),
-        ("file = \"prt.stl\"\nunit = \"mm\"", "5: shape.mesh.file: `prt.stl`: no such file; check the path"),
-        (
-            "file = \".\"\nunit = \"mm\"",
-            "5: shape.mesh.file: `.`: is neither .stl nor .obj; export it as STL or OBJ",
-        ),
-        (
-            "file = \"part.step\"\nunit = \"mm\"",
-            "5: shape.mesh.file: `part.step`: is neither .stl nor .obj; export it as STL or OBJ",
-        ),
-        ("unit = \"mm\"", "5: shape.mesh.unit: unknown key; known: vertices_m, triangles, flat_deg, flat_m"),
-        ("vertices_m = []", "4: shape.mesh.triangles: is missing; add `triangles = ...`"),
-        (
-            "vertices_m = []\ntriangles = [[0, 1]]",
-            "6: shape.mesh.triangles.1: has 2 items; has to be a list of 3",
-        ),
-        (
-            "vertices_m = []\ntriangles = [[0, 1, -2]]",
-            "6: shape.mesh.triangles.1.3: is integer `-2`; has to be a whole number, not negative",
-        ),
-    ] {
-        assert_eq!(message(lines), expected, "{lines}");
+    for case in cases(include_str!("mesh.cases")) {
+        assert_eq!(message(&case.edits[0].0), case.said[0].1);
     }
 }
 
