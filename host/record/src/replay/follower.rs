@@ -200,7 +200,7 @@ impl Follower {
     fn session(&mut self, about: &About) -> Result<(), ReplayError> {
         if about.interface_version != INTERFACE_VERSION {
             let (theirs, release) = (about.interface_version, about.host_version.clone());
-            return Err(ReplayError::OtherInterface { theirs, release });
+            return Err(ReplayError::OtherInterface(theirs, release));
         }
         let model = Model::new(about, self.wanted.hand.as_ref())?;
         if self.model.as_ref().is_none_or(|known| known.hash != model.hash) {

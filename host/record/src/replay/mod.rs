@@ -63,47 +63,21 @@ pub enum ReplayError {
     /// The recording can't be read.
     #[error(transparent)]
     Recording(#[from] RecordingError),
-    /// The hand's file is not in the recording.
-    #[error("the recording does not hold the file of the hand `{hand}` ({hash:08x}): give it with --hand")]
-    UnknownHand {
-        /// The hand.
-        hand: String,
-        /// Its hash.
-        hash: u32,
-    },
-    /// The hand is another.
-    #[error(
-        "the firmware was built for the hand {recorded}, and this one is {found}: give the right one with --hand"
-    )]
-    OtherHand {
-        /// The hash of the firmware.
-        recorded: String,
-        /// The hash of the file.
-        found: String,
-    },
+    /// The file of the hand, with this hash, is not in the recording.
+    #[error("the recording does not hold the file of the hand `{}` ({:08x}): give it with --hand", .0, .1)]
+    UnknownHand(String, u32),
+    /// The firmware was built for one hand, and this is another.
+    #[error("the firmware was built for the hand {}, and this one is {}: give the right one with --hand", .0, .1)]
+    OtherHand(String, String),
     /// The hand's file in the recording is damaged.
     #[error("{0}; the right one can be given with --hand")]
     Hand(SceneError),
-    /// The device speaks another interface version.
-    #[error(
-        "the device had interface version {theirs}, and this program has {INTERFACE_VERSION}: replay with the release {release}"
-    )]
-    OtherInterface {
-        /// The device's.
-        theirs: u16,
-        /// The release that recorded it.
-        release: String,
-    },
-    /// A recorded parameter can't be.
-    #[error("the recorded parameter `{parameter}` [{index}] does not fit the hand: {reason}")]
-    Setting {
-        /// The parameter.
-        parameter: Parameter,
-        /// Of which joint or axis.
-        index: u8,
-        /// The reason.
-        reason: &'static str,
-    },
+    /// The device speaks another interface version, that of a release.
+    #[error("the device had interface version {}, and this program has {INTERFACE_VERSION}: replay with the release {}", .0, .1)]
+    OtherInterface(u16, String),
+    /// A recorded parameter, of this joint or axis, can't be.
+    #[error("the recorded parameter `{}` [{}] does not fit the hand: {}", .0, .1, .2)]
+    Setting(Parameter, u8, &'static str),
     /// The recorded parameters can't be used.
     #[error("the controller refuses the recorded parameters: {0}")]
     Parameters(ParameterError),

@@ -31,13 +31,13 @@ impl Model {
                 HandModel::parse(text, "hand of the recording").map_err(ReplayError::Hand)?
             }
             (None, None) => {
-                return Err(ReplayError::UnknownHand { hand: about.hand.clone(), hash: about.hand_hash });
+                return Err(ReplayError::UnknownHand(about.hand.clone(), about.hand_hash));
             }
         };
         let hash = hand.hash();
         if hash != about.hand_hash {
             let recorded = format!("`{}` ({:08x})", about.hand, about.hand_hash);
-            return Err(ReplayError::OtherHand { recorded, found: format!("`{}` ({hash:08x})", hand.name) });
+            return Err(ReplayError::OtherHand(recorded, format!("`{}` ({hash:08x})", hand.name)));
         }
         let mut config = hand.config;
         config.period_us = about.period_us;
@@ -53,7 +53,7 @@ impl Model {
         let mut config = *before.unwrap_or(&self.config);
         for &Setting { parameter, index, value } in settings {
             let put = config.put(self.joint_names.len(), parameter, index, value);
-            put.map_err(|refusal| ReplayError::Setting { parameter, index, reason: refusal.words() })?;
+            put.map_err(|refusal| ReplayError::Setting(parameter, index, refusal.words()))?;
         }
         Ok(config)
     }
@@ -122,9 +122,9 @@ mod tests {
             }
         }
         let other = About { hand_hash: 1, ..about.clone() };
-        assert!(matches!(Model::new(&other, None), Err(ReplayError::OtherHand { .. })));
+        assert!(matches!(Model::new(&other, None), Err(ReplayError::OtherHand(..))));
         let unknown = About { hand_file: None, ..about };
-        assert!(matches!(Model::new(&unknown, None), Err(ReplayError::UnknownHand { .. })));
+        assert!(matches!(Model::new(&unknown, None), Err(ReplayError::UnknownHand(..))));
         assert!(Model::new(&unknown, Some(&model)).is_ok());
     }
 }
