@@ -60,3 +60,34 @@ fn an_end_stop_holds_a_joint() {
     assert!(deepest_rad < (2.0 * TORQUE_NM * (1.0 + deepest_rad) / stiffness).square_root());
     assert!(off_j.abs() < 1e-4 * flows.motors);
 }
+
+/// Gravity given as a path that does not change is that of the model, to the bit; one that turns makes a pendulum follow, and
+/// its work is what the arm's energy changes by.
+///
+/// Tolerance: 1e-5 of the largest energy, an error of second order in the step.
+#[test]
+fn gravity_may_turn() {
+    let across = Vector3::new(2.0, -1.0, -9.0);
+    let (mut constant, mut path) =
+        (arms(|_| {}), arms(|world| world.gravity_m_s2 = Some(Path::constant(across))));
+    constant.model.hand_gravity_m_s2 = across;
+    constant.model.object_gravity_m_s2 = across;
+    for plant in [&mut constant, &mut path] {
+        plant.run(&[], 0.2, |_| {});
+    }
+    assert_eq!(constant.motion(), path.motion());
+
+    let mut turning = arms(|world| {
+        world.gravity_m_s2 = Some(Path::new(|t_s| {
+            let (sine, cosine) = (5.0 * t_s).sine_cosine();
+            Vector3::new(sine, -cosine, 0.0) * GRAVITY_M_S2
+        }));
+    });
+    let (mut off_j, mut most_j) = (0.0f64, 0.0f64);
+    turning.run(&[], 1.0, |plant| {
+        most_j = most_j.max(plant.kinetic_energy_j());
+        off_j = off_j.max((plant.kinetic_energy_j() - plant.flows().weight).abs());
+    });
+    println!("off by {off_j:.1e} J of {most_j:.1e} J, at {:.2} rad", turning.motion().angles_rad[0]);
+    assert!(off_j < 1e-5 * most_j && turning.motion().angles_rad[0].abs() > 0.1);
+}
