@@ -45,7 +45,7 @@ mod with_probes {
     #[test]
     fn a_dry_run_tells_what_the_image_is_and_takes() {
         let folder = Folder::new();
-        let path = folder.write("hand", &Elf::good(&image()).bytes());
+        let path = folder.write("hand", Elf::good(&image()).bytes());
         let output = folder.run(&["flash", &path, "--dry-run", "--json"]);
         assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
         assert!(output.stderr.is_empty());
@@ -94,7 +94,7 @@ mod with_probes {
             &["flash", "--dry-run"],
             &["no image", "thumbv7em-none-eabihf/firmware/hand", "tests/firmware-toolchain cargo build"],
         );
-        let path = folder.write("debian/thumbv7em-none-eabihf/firmware/hand", &Elf::good(&image()).bytes());
+        let path = folder.write("debian/thumbv7em-none-eabihf/firmware/hand", Elf::good(&image()).bytes());
         let output = folder.run(&["flash", "--dry-run", "--json"]);
         let report: Value = serde_json::from_slice(&output.stdout).expect("one JSON object");
         assert_eq!(report["image"], Value::from(path));
@@ -141,7 +141,7 @@ mod with_probes {
     #[test]
     fn files_and_chips_that_are_not_there_are_named() {
         let folder = Folder::new();
-        let path = folder.write("image", &Elf::good(&image()).bytes());
+        let path = folder.write("image", Elf::good(&image()).bytes());
         folder.refused(&["flash", "nowhere/hand", "--dry-run"], &["cannot read the image nowhere/hand"]);
         folder.refused(&["flash", "/", "--dry-run"], &["cannot read the image /: it is a folder"]);
         let default = default_chip();
@@ -159,10 +159,10 @@ mod with_probes {
     fn a_smaller_chip_is_told_apart() {
         // STM32F401RB: 128 KiB of flash, 64 KiB of RAM.
         let folder = Folder::new();
-        let path = folder.write("image", &Elf::good(&image()).bytes());
+        let path = folder.write("image", Elf::good(&image()).bytes());
         let small = ["flash", path.as_str(), "--dry-run", "--chip", "STM32F401RBTx"];
         folder.refused(&small, &["stack pointer 0x20020000", "--chip"]);
-        let path = folder.write("small", &Elf::good(&image()).with_word(0, RAM + 0x1_0000).bytes());
+        let path = folder.write("small", Elf::good(&image()).with_word(0, RAM + 0x1_0000).bytes());
         let small = ["flash", path.as_str(), "--dry-run", "--json", "--chip", "STM32F401RBTx"];
         let report: Value = serde_json::from_slice(&folder.run(&small).stdout).expect("one JSON object");
         assert_eq!(report["flash"]["available_bytes"], 128 * 1024);
@@ -172,11 +172,11 @@ mod with_probes {
     #[test]
     fn the_hand_of_the_image_is_compared_with_the_file() {
         let folder = Folder::new();
-        let path = folder.write("image", &Elf::good(&Image { hand: "another", ..image() }).bytes());
+        let path = folder.write("image", Elf::good(&Image { hand: "another", ..image() }).bytes());
         let model = concat!(env!("CARGO_MANIFEST_DIR"), "/../models/hands/three-finger.toml");
         let arguments = ["flash", path.as_str(), "--dry-run", "--hand", model];
         folder.refused(&arguments, &["for the hand `another`, not for `three-finger`"]);
-        let path = folder.write("image", &Elf::good(&image()).bytes());
+        let path = folder.write("image", Elf::good(&image()).bytes());
         let arguments = ["flash", path.as_str(), "--dry-run", "--hand", model];
         folder.refused(&arguments, &["hash 01234567", "build the image again"]);
         let arguments = ["flash", path.as_str(), "--dry-run", "--hand", "nowhere.toml"];
@@ -186,7 +186,7 @@ mod with_probes {
     #[test]
     fn without_a_probe_that_is_said() {
         let folder = Folder::new();
-        let path = folder.write("image", &Elf::good(&image()).bytes());
+        let path = folder.write("image", Elf::good(&image()).bytes());
         // Which of the two depends on what is connected to this machine.
         folder.refused(&["flash", &path, "--probe", NO_PROBE], &["no debug probe"]);
         let arguments = ["flash", &path, "--brown-out", "3", "--probe", NO_PROBE];
@@ -196,11 +196,11 @@ mod with_probes {
     #[test]
     fn monitoring_needs_logs_in_the_image() {
         let folder = Folder::new();
-        let path = folder.write("image", &Elf::good(&image()).bytes());
+        let path = folder.write("image", Elf::good(&image()).bytes());
         folder.refused(&["flash", &path, "--monitor", "--probe", NO_PROBE], &["no defmt logs"]);
         let mut elf = with_logs("rzcobs");
         elf.symbols.remove(0);
-        let path = folder.write("image", &elf.bytes());
+        let path = folder.write("image", elf.bytes());
         folder.refused(&["flash", &path, "--monitor", "--probe", NO_PROBE], &["_SEGGER_RTT"]);
     }
 
