@@ -22,7 +22,7 @@ fn folder() -> PathBuf {
 
 /// The whole command: the verdicts are those that the documentation states, and every file is there.
 #[test]
-#[ignore = "all of the paper takes a minute and a half"]
+#[ignore = "takes a minute and a half: `tests/run all` runs it"]
 fn the_paper_is_run_and_checked() {
     let folder = folder();
     let path = folder.to_str().expect("a path");
