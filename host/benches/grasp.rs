@@ -1,7 +1,9 @@
 //! `cargo bench`: the tick and the law on the host, one step of the plant, and a whole run.
 
+use blindgrasp::body::dynamics::JointVector;
 use blindgrasp::body::{MAX_JOINTS, Posture};
 use blindgrasp::model::Scene;
+use blindgrasp::plant::coulomb::{self, Friction, Path, Table};
 use blindgrasp::plant::{Motion, Plant};
 use blindgrasp::sim::{self, Simulation};
 use blindgrasp_shared::command::{Command, Grasp};
@@ -118,22 +120,27 @@ fn told(criterion: &mut Criterion, record: &Record<J>) {
     group.finish();
 }
 
+/// Torques of the law for a scene that begins at rest, and that beginning.
+fn beginning(scene: &Scene) -> (Motion, JointVector) {
+    let mut angles = [0.0; MAX_JOINTS];
+    angles[..scene.start.angles_rad.len()].copy_from_slice(&scene.start.angles_rad);
+    let start = Motion::at_rest(angles, scene.start.position_m, scene.start.attitude);
+    let laws = sim::laws(scene).expect("gains");
+    let mut posture = Posture::at_base();
+    scene.hand.forward_kinematics(&angles, &mut posture);
+    let latch = Latch::of(&posture, &angles);
+    let stance = Stance { hand: &scene.hand, posture: &posture, angles_rad: &angles };
+    (start, laws.torques(&stance, &[0.0; MAX_JOINTS], Some(&laws.grip(&latch))).0)
+}
+
 /// A step of the plant, and with it the paper's two hands: solving and advancing, without the controller.
 fn plant(criterion: &mut Criterion) {
     for (name, what) in
         [("cube-ideal", "12 joints, cube"), ("prism-ideal", "12 joints, prism"), ("hand-arm", "hand-arm")]
     {
         let scene = Scene::load(name, &[]).expect("the scene is built in");
-        let mut angles = [0.0; MAX_JOINTS];
-        angles[..scene.start.angles_rad.len()].copy_from_slice(&scene.start.angles_rad);
-        let start = Motion::at_rest(angles, scene.start.position_m, scene.start.attitude);
+        let (start, torques) = beginning(&scene);
         let begin = || Plant::new(sim::model(&scene), start, scene.plant.substep_s).expect("a plant");
-        let laws = sim::laws(&scene).expect("gains");
-        let mut posture = Posture::at_base();
-        scene.hand.forward_kinematics(&angles, &mut posture);
-        let latch = Latch::of(&posture, &angles);
-        let stance = Stance { hand: &scene.hand, posture: &posture, angles_rad: &angles };
-        let (torques, _) = laws.torques(&stance, &[0.0; MAX_JOINTS], Some(&laws.grip(&latch)));
         let mut plant = begin();
         let mut steps = 0;
         criterion.bench_function(&format!("plant step ({what})"), |bencher| {
@@ -144,6 +151,50 @@ fn plant(criterion: &mut Criterion) {
                     plant = begin();
                 }
                 plant.solve(black_box(&torques)).expect("the grasp holds");
+                plant.advance();
+            });
+        });
+    }
+}
+
+/// A step of the plant with Coulomb friction at 0.5 ms: what the cube is held with does not slip; with a table under it; and with
+/// fingers that slip.
+fn plant_with_friction(criterion: &mut Criterion) {
+    let scene = cube();
+    let (start, torques) = beginning(&scene);
+    let lowest_m =
+        scene.object.vertices_m.iter().map(|vertex| (start.attitude * vertex).z).fold(0.0, f64::min);
+    let under = start.position_m + Vector3::z() * lowest_m;
+    for (name, sliding, has_table) in
+        [("held", 1.0, false), ("on a table", 1.0, true), ("sliding", 0.02, false)]
+    {
+        let friction = Friction { sliding, torsion_m: 2e-3 };
+        let table = Table {
+            point_m: Path::constant(under),
+            normal: Vector3::z(),
+            object_friction: 0.5,
+            fingertip_friction: friction,
+        };
+        let world = coulomb::World {
+            fingertip_friction: vec![friction; F],
+            tables: if has_table { vec![table] } else { vec![] },
+            joint_limits: true,
+            ..coulomb::World::default()
+        };
+        let begin = || {
+            let mut model = sim::model(&scene);
+            model.object_gravity_m_s2 = Vector3::z() * -9.81;
+            coulomb::Plant::new(model, world.clone(), start, 5e-4).expect("a plant")
+        };
+        let mut plant = begin();
+        let mut steps = 0;
+        criterion.bench_function(&format!("plant step with friction ({name})"), |bencher| {
+            bencher.iter(|| {
+                steps += 1;
+                if steps % 40 == 0 {
+                    plant = begin();
+                }
+                plant.solve(black_box(&torques)).expect("it does not diverge");
                 plant.advance();
             });
         });
@@ -164,5 +215,5 @@ fn run(criterion: &mut Criterion) {
     group.finish();
 }
 
-criterion_group!(benches, controller, plant, run);
+criterion_group!(benches, controller, plant, plant_with_friction, run);
 criterion_main!(benches);

@@ -75,7 +75,7 @@ impl Format {
 /// Reads the triangles of a file, each for itself, in its own unit.
 ///
 /// # Errors
-/// What is wrong with the file, with its place.
+/// The fault of the file, with its place.
 pub fn parse(format: Format, bytes: Vec<u8>) -> Result<Soup, Problem> {
     match format {
         Format::Stl => stl::read(bytes),
@@ -86,7 +86,7 @@ pub fn parse(format: Format, bytes: Vec<u8>) -> Result<Soup, Problem> {
 /// Returns the closed surface in metres that the triangles of a file enclose.
 ///
 /// # Errors
-/// What keeps them from enclosing one body.
+/// The first fault that keeps them from enclosing one body.
 pub fn body(mut soup: Soup, unit: Unit, scale: f64) -> Result<Repaired, Problem> {
     soup.scale(|length| unit.metres(length * scale));
     let is_far = |corner: &nalgebra::Vector3<f64>| !(corner.amax() <= FARTHEST_M);

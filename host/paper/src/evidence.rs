@@ -18,7 +18,7 @@ const SAMPLE_S: f64 = 1e-3;
 pub struct EvidenceError(pub String);
 
 impl EvidenceError {
-    /// What is wrong with a run.
+    /// The fault of a run, in words.
     pub fn of(run: &str, cause: impl Display) -> Self {
         Self(format!("run `{run}`: {cause}"))
     }

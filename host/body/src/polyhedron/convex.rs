@@ -5,7 +5,7 @@ use super::Polyhedron;
 use blindgrasp_shared::math::norm;
 use nalgebra::Vector3;
 
-/// How far a vertex may stand out of a face's plane, in units of the body's extent, while the body counts as convex.
+/// The most that a vertex may stand out of a face's plane, in units of the body's extent, while the body counts as convex.
 const FLAT: f64 = 1e-6;
 
 /// A convex polyhedron, prepared to be asked often.

@@ -106,7 +106,7 @@ impl Material {
         }
     }
 
-    /// What the rolling contact makes of it: stiffness and damping frozen at a depth, for a comparison with it.
+    /// The response of the rolling contact: stiffness and damping frozen at a depth, for a comparison with it.
     pub(super) fn frozen(&self, depth_m: f64, before_m_s: f64, rate_m_s: f64, tau_s: f64) -> Response {
         let d = depth_m.max(0.0);
         let (damping, stiffness) = (self.damping_n_s_m(d), self.linear_n_m + 2.0 * self.quadratic_n_m2 * d);

@@ -242,8 +242,7 @@ impl Problem {
             // One refinement: the residual without the proximal term.
             self.update_velocities();
             self.change.fill(0.0);
-            for (place, &pressed) in self.places.iter().zip(&self.pressed).filter(|(_, pressed)| **pressed) {
-                debug_assert!(pressed);
+            for (place, _) in self.places.iter().zip(&self.pressed).filter(|(_, pressed)| **pressed) {
                 let r = place.normal;
                 self.change[r] = (place.a - self.forces[r]) * place.softness() - self.velocities[r];
                 for r in place.tangential() {
@@ -352,7 +351,6 @@ impl Problem {
 
     /// Largest residual of the forces (those of the natural map), relative to the largest force.
     fn error(&self) -> f64 {
-        let n = self.count;
         let (mut error, mut scale) = (0.0f64, 0.0f64);
         for place in &self.places {
             let force = self.forces[place.normal];
@@ -373,7 +371,6 @@ impl Problem {
                 error = error.max((target - self.forces[r]).abs());
             }
         }
-        debug_assert!(n == self.forces.len());
         if error > 0.0 {
             error / scale.max(f64::MIN_POSITIVE)
         } else if error == 0.0 {

@@ -7,7 +7,7 @@ use crate::vectors::{Everything, add, head, set_tail, tail};
 use blindgrasp_body::MAX_JOINTS;
 
 impl Plant {
-    /// Where a contact begins to stick: projects the velocities of the half step ahead onto no slip of all that stick.
+    /// Projects, where a contact begins to stick, the velocities of the half step ahead onto no slip of all that stick.
     pub(super) fn hold_what_sticks(&mut self) {
         let begins = self.contacts.iter().any(|c| c.sticks && !self.stuck.contains(&c.touch.pair));
         self.stuck.clear();

@@ -4,7 +4,6 @@ mod grasps;
 mod joints;
 mod order;
 mod robustness;
-mod speed;
 mod tables;
 
 use super::*;

@@ -61,7 +61,7 @@ fn a_held_object_does_not_creep() {
                 crept.norm(),
                 plant.counters()
             );
-            assert!(crept.z.abs() < 1e-3);
+            assert!(crept.norm() < 1e-3);
         }
     }
 }
@@ -103,6 +103,7 @@ fn a_grasp_too_weak_slides_as_it_must() {
             "{fingers} fingers: acceleration off by {off:.1e} g, way by {way:.1e}, {:?}",
             plant.counters()
         );
+        assert!(off < 1e-6 && way.abs() < 1e-3);
     }
 }
 
