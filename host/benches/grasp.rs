@@ -3,8 +3,9 @@
 use blindgrasp::body::dynamics::JointVector;
 use blindgrasp::body::{MAX_JOINTS, Posture};
 use blindgrasp::model::Scene;
+use blindgrasp::plant::Motion;
 use blindgrasp::plant::coulomb::{self, Friction, Path, Table};
-use blindgrasp::plant::{Motion, Plant};
+use blindgrasp::plant::integrator::Plant;
 use blindgrasp::sim::{self, Simulation};
 use blindgrasp_shared::command::{Command, Grasp};
 use blindgrasp_shared::control::{Chosen, Hold, Latch, LawsConfig, Stance};
@@ -178,12 +179,12 @@ fn plant_with_friction(criterion: &mut Criterion) {
         let world = coulomb::World {
             fingertip_friction: vec![friction; F],
             tables: if has_table { vec![table] } else { vec![] },
-            joint_limits: true,
             ..coulomb::World::default()
         };
         let begin = || {
             let mut model = sim::model(&scene);
             model.object_gravity_m_s2 = Vector3::z() * -9.81;
+            model.joint_limits = true;
             coulomb::Plant::new(model, world.clone(), start, 5e-4).expect("a plant")
         };
         let mut plant = begin();

@@ -5,9 +5,9 @@ use crate::supervised::{Outcome, Turned};
 use blindgrasp::body::dynamics::JointVector;
 use blindgrasp::body::{MAX_FINGERS, MAX_JOINTS, Posture};
 use blindgrasp::model::Scene;
-use blindgrasp::plant::Plant;
 use blindgrasp::plant::contact::Rows;
 use blindgrasp::plant::friction::{stretch, torque};
+use blindgrasp::plant::integrator::Plant;
 use blindgrasp::sim;
 use blindgrasp::sim::sample::Sample;
 use blindgrasp_shared::command::{Command, Grasp};
@@ -78,7 +78,11 @@ pub fn keep(scene: &Scene) -> Vec<Page> {
         Params::new(scene.hand.cast(), &scene.controller_config()).unwrap_or_else(|error| panic!("{error}"));
     assert!(scene.actuators.output_delay_ticks <= 1, "a tick of delay at most");
     let mut state = State::new();
-    let mut plant = sim::plant(scene).unwrap_or_else(|error| panic!("{error}"));
+    let blindgrasp::plant::Plant::Rolling(mut plant) =
+        sim::plant(scene).unwrap_or_else(|error| panic!("{error}"))
+    else {
+        panic!("{}: its contacts do not roll", scene.name)
+    };
     let friction = plant.model().friction.clone();
     let joints = scene.joints.len();
     let substep_s = scene.plant.substep_s;

@@ -10,7 +10,8 @@ use blindgrasp::body::dynamics::JointVector;
 use blindgrasp::body::polyhedron::Polyhedron;
 use blindgrasp::body::{FaceContact, FingertipModel};
 use blindgrasp::body::{Hand, MAX_FINGERS, MAX_JOINTS, Posture};
-use blindgrasp::plant::{Motion, ObjectModel, Plant, PlantModel};
+use blindgrasp::plant::integrator::Plant;
+use blindgrasp::plant::{Motion, ObjectModel, PlantModel};
 use blindgrasp_shared::control::{Account, Chosen, Hold, Latch, Laws, LawsConfig, PerGain, Stance};
 use blindgrasp_shared::math::Real;
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
@@ -127,6 +128,8 @@ impl Grasp {
         let model = PlantModel {
             fingertips: vec![fingertip; hand.fingertip_count()],
             friction: vec![JointFriction::default(); hand.joint_count()],
+            rotor_inertia_kg_m2: Vec::new(),
+            joint_limits: false,
             hand,
             object: ObjectModel {
                 shape: held.shape.clone(),

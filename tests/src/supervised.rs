@@ -4,7 +4,8 @@
 use crate::books::stored_j;
 use blindgrasp::body::{MAX_FINGERS, MAX_JOINTS, Posture};
 use blindgrasp::model::{HandModel, Scene};
-use blindgrasp::plant::{Motion, Plant};
+use blindgrasp::plant::Motion;
+use blindgrasp::plant::integrator::Plant;
 use blindgrasp::sim::controller::{Controller, Reach, Stepped, Turn};
 use blindgrasp::sim::injection::{Injection, Kind};
 use blindgrasp::sim::{Run, Simulation, model};

@@ -3,8 +3,9 @@
 use blindgrasp::body::dynamics::JointVector;
 use blindgrasp::body::{MAX_FINGERS, MAX_JOINTS, Posture};
 use blindgrasp::model::Scene;
+use blindgrasp::plant::Motion;
 use blindgrasp::plant::coulomb::{self, Friction, World};
-use blindgrasp::plant::{Motion, Plant};
+use blindgrasp::plant::integrator::Plant;
 use blindgrasp::sim;
 use blindgrasp_shared::control::{Latch, Laws, Stance};
 

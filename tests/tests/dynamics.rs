@@ -3,7 +3,8 @@
 use blindgrasp::body::dynamics::{Body, JointMatrix, JointVector, bias_torques, mass_matrix, place_bodies};
 use blindgrasp::body::polyhedron::Polyhedron;
 use blindgrasp::body::{Hand, MAX_JOINTS, Posture};
-use blindgrasp::plant::{Motion, ObjectModel, Plant, PlantModel};
+use blindgrasp::plant::integrator::Plant;
+use blindgrasp::plant::{Motion, ObjectModel, PlantModel};
 use blindgrasp_shared::math::Real;
 use blindgrasp_tests::description::{Description, axial};
 use blindgrasp_tests::grasps::GRAVITY_M_S2;
@@ -177,6 +178,8 @@ fn apart(description: &Description, object: ObjectModel, motion: Motion, substep
     let model = PlantModel {
         fingertips: vec![],
         friction: vec![Default::default(); hand.joint_count()],
+        rotor_inertia_kg_m2: Vec::new(),
+        joint_limits: false,
         hand,
         object,
         faces: vec![],

@@ -1,7 +1,8 @@
 //! The integrator: its order, the energy that it keeps, and that it stays stable where it is coarse.
 
 use blindgrasp::body::FingertipModel;
-use blindgrasp::plant::{Motion, Plant};
+use blindgrasp::plant::Motion;
+use blindgrasp::plant::integrator::Plant;
 use blindgrasp_tests::books::contact_power_w;
 use blindgrasp_tests::grasps::{DAMPING_NM_S, FINGERTIP, Grasp, Held, cube, prism};
 use blindgrasp_tests::hands::{FINGER_JOINTS, three_finger};

@@ -2,8 +2,9 @@
 //! defaults and words are those of the structs that the files are read into.
 
 use blindgrasp::model::file::{
-    Actuators, ContactFile, Control, FileKey, FingertipFile, Friction, HandFile, JointFile, ObjectFile,
-    PlantSettings, PoseFile, PushFile, SceneFile, Sensors, ShapeFile, StartFile,
+    Actuators, ContactFile, Control, FileKey, FingertipFile, Friction, HandFile, JointFile, MoveFile,
+    ObjectFile, PlantSettings, PoseFile, PushFile, SceneFile, Sensors, ShakeFile, ShapeFile, StartFile,
+    TableFile, TurnFile,
 };
 use blindgrasp::model::{Scene, mesh};
 use blindgrasp::sim::Simulation;
@@ -77,8 +78,10 @@ fn value(rust: &str) -> &'static str {
         "InertiaFile" => "3 or 6 numbers",
         "BTreeMap<String, f64>" => "names with numbers",
         "Indentation" => "number or text",
+        "ContactLaw" => "text",
         "HandFile" | "ObjectFile" => "text or table",
-        "Vec<ContactFile>" | "Vec<PushFile>" => "tables",
+        "Vec<ContactFile>" | "Vec<PushFile>" | "Vec<TableFile>" | "Vec<MoveFile>" | "Vec<TurnFile>"
+        | "Vec<ShakeFile>" => "tables",
         "PoseFile" | "StartFile" | "Control" | "Sensors" | "Actuators" | "Friction" | "PlantSettings"
         | "ShapeFile" => "table",
         unknown => panic!("no words for the type {unknown}"),
@@ -217,7 +220,12 @@ fn the_document_has_every_key_of_a_scene() {
         "schema": 1, "name": "least", "duration_s": 1.0, "hand": hand, "object": object, "pose": pose, "contact": [],
         "control": gains
     });
-    let push = json!({"from_s": 1.0, "for_s": 1.0});
+    let span = |mut entries: Value| {
+        entries["from_s"] = json!(1.0);
+        entries["for_s"] = json!(1.0);
+        entries
+    };
+    let push = span(json!({}));
     let sections = [
         ("The file", table::<SceneFile>(SceneFile::KEYS, &scene)),
         ("`[pose]`", table::<PoseFile>(PoseFile::KEYS, &pose)),
@@ -228,6 +236,22 @@ fn the_document_has_every_key_of_a_scene() {
         ("`[actuators]`", table::<Actuators>(Actuators::KEYS, &nothing)),
         ("`[friction]`", table::<Friction>(Friction::KEYS, &nothing)),
         ("`[plant]`", table::<PlantSettings>(PlantSettings::KEYS, &nothing)),
+        ("`[[plant.table]]`", table::<TableFile>(TableFile::KEYS, &json!({"point_m": [0.0, 0.0, 0.0]}))),
+        (
+            "`[[plant.table.move]]`",
+            table::<MoveFile>(MoveFile::KEYS, &span(json!({"by_m": [0.0, 0.0, 0.0]}))),
+        ),
+        (
+            "`[[plant.turn]]`",
+            table::<TurnFile>(TurnFile::KEYS, &span(json!({"gravity_m_s2": [0.0, 0.0, 0.0]}))),
+        ),
+        (
+            "`[[plant.shake]]`",
+            table::<ShakeFile>(
+                ShakeFile::KEYS,
+                &span(json!({"amplitude_m_s2": [0.0, 0.0, 0.0], "frequency_hz": 1.0})),
+            ),
+        ),
         ("`[[plant.push]]`", table::<PushFile>(PushFile::KEYS, &push)),
     ];
     let text: String =

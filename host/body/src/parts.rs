@@ -27,6 +27,16 @@ pub struct FaceContact {
     pub distance_m: f64,
 }
 
+/// Friction of a contact.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct ContactFriction {
+    /// Coefficient of Coulomb friction.
+    pub sliding: f64,
+    /// Largest torsional torque for each newton of normal force, m; it shares the limit with the tangential force, as the
+    /// ellipsoidal limit surface has it.
+    pub torsion_m: f64,
+}
+
 /// Friction of one joint; zero in the paper's model.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct JointFriction {

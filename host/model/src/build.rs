@@ -7,6 +7,7 @@ use super::{
     hand::{fingertip_parameters, joint_parameters, overlaps, still_joints},
     object::object,
     start::start,
+    world,
 };
 use blindgrasp_shared::control::GAINS;
 use nalgebra::Vector3;
@@ -48,6 +49,7 @@ pub(super) fn scene(file: SceneFile) -> Result<Scene> {
         let problem = format!("joint `{}` moves no mass", file.hand.joints[k].name);
         return fail(item("hand.joint", k, "mass_kg"), problem, "give its link a mass and an inertia");
     }
+    world::at_start(&file, &hand, &object.shape, &start)?;
     overlaps(&file.hand, &hand, &start.angles_rad, &mut warnings);
 
     Ok(Scene {
@@ -58,6 +60,7 @@ pub(super) fn scene(file: SceneFile) -> Result<Scene> {
         hand,
         joints: file.hand.joints.iter().map(|joint| joint_parameters(joint, &file)).collect(),
         fingertips: file.hand.fingertips.iter().map(fingertip_parameters).collect(),
+        fingertip_friction: world::frictions(&file),
         object: object.shape,
         object_name: file.object.name.clone(),
         mass_kg: object.mass_kg,
@@ -96,6 +99,7 @@ fn settings(file: &SceneFile) -> Result<usize> {
     }
     within("friction.scale", file.friction.scale, 0.0, 1e4)?;
     all_within("plant.gravity_m_s2", &file.plant.gravity_m_s2, 1000.0)?;
+    world::settings(&file.plant, LONGEST_RUN_S)?;
     file.plant.pushes.iter().enumerate().try_for_each(|(index, push)| self::push(index, push))?;
     within("plant.substep_s", file.plant.substep_s, 1e-7, control.period_s)?;
     let ratio = control.period_s / file.plant.substep_s;

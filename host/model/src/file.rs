@@ -9,12 +9,14 @@ mod key;
 mod object;
 mod push;
 mod safety;
+mod world;
 
 pub use control::Control;
 pub use key::{FileKey, ShapeKind};
 pub use object::{ObjectFile, ShapeFile};
 pub use push::PushFile;
 pub use safety::{Safety, SafetyKey};
+pub use world::{ContactLaw, MoveFile, PlantSettings, ShakeFile, TableFile, TurnFile};
 
 use key::keys;
 use serde::{Deserialize, Deserializer, Serialize, Serializer, de};
@@ -236,48 +238,6 @@ impl Default for Friction {
 }
 
 keys! {
-    /// The simulated world.
-    #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-    #[serde(deny_unknown_fields)]
-    pub struct PlantSettings {
-        /// Step of the integrator, s; it has to divide `control.period_s`.
-        #[serde(default = "PlantSettings::substep_s")]
-        pub substep_s: f64,
-        /// Gravity in the hand's base frame, m/s^2. It acts on the hand; on the object only with `gravity_on_object`.
-        #[serde(default = "PlantSettings::gravity_m_s2")]
-        pub gravity_m_s2: [f64; 3],
-        /// `true`: gravity acts on the object too. The paper neglects its weight (assumption 5), so that it has none unless
-        /// asked.
-        #[serde(default)]
-        pub gravity_on_object: bool,
-        /// Pushes at the object from outside, one `[[plant.push]]` each; several at a time add up.
-        #[serde(rename = "push", default, skip_serializing_if = "Vec::is_empty")]
-        pub pushes: Vec<PushFile>,
-    }
-}
-
-impl PlantSettings {
-    fn substep_s() -> f64 {
-        1e-4
-    }
-
-    fn gravity_m_s2() -> [f64; 3] {
-        [0.0, 0.0, -9.81]
-    }
-}
-
-impl Default for PlantSettings {
-    fn default() -> Self {
-        Self {
-            substep_s: Self::substep_s(),
-            gravity_m_s2: Self::gravity_m_s2(),
-            gravity_on_object: false,
-            pushes: Vec::new(),
-        }
-    }
-}
-
-keys! {
     /// A hand.
     #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
     #[serde(deny_unknown_fields)]
@@ -357,6 +317,9 @@ keys! {
         /// Size of the torque at the joint for each volt at its amplifier, N m/V: amplifier (A/V) times motor (N m/A) times gear.
         #[serde(default = "JointFile::torque_per_volt_nm_v")]
         pub torque_per_volt_nm_v: f64,
+        /// Inertia of the motor's rotor as the joint feels it: times the square of the gear, kg m^2.
+        #[serde(default)]
+        pub rotor_inertia_kg_m2: f64,
         /// Viscous friction at the joint, N m s/rad.
         #[serde(default)]
         pub viscous_friction_nm_s_rad: f64,
@@ -414,6 +377,12 @@ keys! {
         pub damping_n_s_m_per_m2: f64,
         /// Torsional damping `b_i` of Eq. 15 for each square metre of contact area, (N m s/rad)/m^2.
         pub torsional_damping_nm_s_rad_per_m2: f64,
+        /// Coefficient of its friction; the object's file may have a lower one.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        pub friction: Option<f64>,
+        /// Largest torque about the contact's normal for each newton of normal force, m.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        pub torsional_friction_m: Option<f64>,
     }
 }
 

@@ -188,6 +188,8 @@ fn check_fingertip(
         within(&key("stiffness_n_m2"), file.stiffness_n_m2, 1.0, 1e13),
         within(&key("damping_n_s_m_per_m2"), file.damping_n_s_m_per_m2, 0.0, 1e12),
         within(&key("torsional_damping_nm_s_rad_per_m2"), file.torsional_damping_nm_s_rad_per_m2, 0.0, 1e12),
+        within(&key("friction"), file.friction.unwrap_or_default(), 0.0, 100.0),
+        within(&key("torsional_friction_m"), file.torsional_friction_m.unwrap_or_default(), 0.0, 1.0),
     ]);
     if !(file.radius_m > 0.0) {
         file.radius_m = 0.01;
@@ -215,6 +217,7 @@ fn check_joint(file: &mut JointFile, key: &dyn Fn(&str) -> String, refused: &mut
         ),
         within(&key("torque_per_volt_nm_v"), file.torque_per_volt_nm_v, 1e-6, 1e4)
             .map_err(|error| SceneError { remedy: error.remedy + "; its sign is `motor_reversed`", ..error }),
+        within(&key("rotor_inertia_kg_m2"), file.rotor_inertia_kg_m2, 0.0, 1e4),
         within(&key("viscous_friction_nm_s_rad"), file.viscous_friction_nm_s_rad, 0.0, 1e6),
         within(&key("coulomb_friction_nm"), file.coulomb_friction_nm, 0.0, 1e6),
         within(&key("presliding_rad"), file.presliding_rad, 1e-9, 1.0),

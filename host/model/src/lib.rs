@@ -26,10 +26,11 @@ mod start;
 mod tests;
 mod tree;
 mod urdf;
+mod world;
 
 use blindgrasp_body::JointFriction;
 use blindgrasp_body::polyhedron::Polyhedron;
-use blindgrasp_body::{FaceContact, FingertipModel};
+use blindgrasp_body::{ContactFriction, FaceContact, FingertipModel};
 use blindgrasp_body::{Hand, MAX_JOINTS};
 use blindgrasp_shared::control::LawsConfig;
 use blindgrasp_shared::math::Real;
@@ -74,6 +75,8 @@ pub struct Scene {
     pub joints: Vec<JointParameters>,
     /// One a fingertip, in the hand's order.
     pub fingertips: Vec<FingertipModel>,
+    /// The friction of each fingertip against the object, where contacts have friction.
+    pub fingertip_friction: Vec<ContactFriction>,
     /// The object in its own frame.
     pub object: Polyhedron,
     /// Its name.

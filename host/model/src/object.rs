@@ -74,7 +74,11 @@ pub(super) fn object(file: &ObjectFile, warnings: &mut Vec<String>) -> Result<Ob
 }
 
 fn examine(file: &ObjectFile, warnings: &mut Vec<String>, refused: &mut Refused) -> Option<ObjectBody> {
-    refused.take_all([schema("schema", file.schema), name("name", &file.name)]);
+    refused.take_all([
+        schema("schema", file.schema),
+        name("name", &file.name),
+        within("friction", file.friction.unwrap_or_default(), 0.0, 100.0),
+    ]);
     if let ShapeFile::Mesh { flat_deg, flat_m, .. } = &file.shape {
         refused.take_all([
             within("shape.mesh.flat_deg", *flat_deg, 0.0, 45.0),

@@ -3,6 +3,7 @@
 use super::Placement;
 use blindgrasp_model::file::{Indentation, SceneFile};
 use blindgrasp_shared::control::GAINS;
+use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
 /// The scene as a file: reading it gives the placement's scene again. `hand` and `object` are built-in names, or paths
@@ -142,14 +143,9 @@ fn settings(text: &mut String, file: &SceneFile) {
     }
     let _ = write!(
         text,
-        "\n[friction]\nscale = {:?}\n\n[plant]\nsubstep_s = {:?}\ngravity_m_s2 = {:?}\ngravity_on_object = {}\n",
-        file.friction.scale, plant.substep_s, plant.gravity_m_s2, plant.gravity_on_object,
+        "\n[friction]\nscale = {:?}\n\n{}",
+        file.friction.scale,
+        // Only what TOML can't express fails, and none of the structs contains such a thing.
+        toml::to_string(&BTreeMap::from([("plant", plant)])).unwrap_or_default(),
     );
-    for push in &plant.pushes {
-        let _ = write!(
-            text,
-            "\n[[plant.push]]\nfrom_s = {:?}\nfor_s = {:?}\nrise_s = {:?}\nforce_n = {:?}\nmoment_nm = {:?}\n",
-            push.from_s, push.for_s, push.rise_s, push.force_n, push.moment_nm,
-        );
-    }
 }

@@ -20,6 +20,8 @@
 //! Eq. 21 is read as `I dw/dt + w x I w`.
 
 use super::contact::{Contact, Rows};
+use super::coulomb::material::Material;
+use super::coulomb::stiffness::limits;
 use super::coupling::Coupling;
 use super::friction::{FrictionTorque, stretch, torque};
 use super::ledger::Flows;
@@ -29,7 +31,7 @@ use super::push::share;
 use super::rotation::{solve_inertia, turn_freely, world_inertia};
 use super::surroundings::Surroundings;
 use super::vectors::{Everything, combine, dot6, set_tail, set_velocities, tail, velocities};
-use blindgrasp_body::dynamics::{Body, JointMatrix, JointVector, bias_torques, mass_matrix, place_bodies};
+use blindgrasp_body::dynamics::{Body, JointMatrix, JointVector, bias_torques, place_bodies};
 use blindgrasp_body::{MAX_CHAIN, MAX_FINGERS, MAX_JOINTS, Posture};
 use blindgrasp_shared::math::Real;
 use nalgebra::Vector3;
@@ -65,7 +67,9 @@ pub struct Plant {
     forces: Vec<ContactForce>,
     coupling: Coupling,
     solution: Everything,
-    /// Friction of the joints at this instant, at standstill.
+    /// The ends of the joints' ranges, where they act.
+    limits: Vec<Material>,
+    /// Friction of the joints at this instant, at standstill, and what the ends of their ranges add.
     friction: [FrictionTorque; MAX_JOINTS],
     /// Powers at this instant, and work up to the half step before it.
     power: Flows,
@@ -108,6 +112,7 @@ impl Plant {
             steps: 0,
             pushed: [0.0; 6],
             solution: velocities,
+            limits: Vec::new(),
             friction: [FrictionTorque::NONE; MAX_JOINTS],
             power: Flows::NONE,
             work: Flows::NONE,
@@ -115,11 +120,13 @@ impl Plant {
         };
         plant.place();
         let object = ObjectMass { mass_kg: plant.model.object.mass_kg, inertia_kg_m2 };
-        if plant.coupling.mass.factorize(&plant.mass, &[0.0; MAX_JOINTS], &object) > LEAST_PIVOT {
-            Ok(plant)
-        } else {
-            Err(ModelError::NoMass)
+        if !(plant.coupling.mass.factorize(&plant.mass, &[0.0; MAX_JOINTS], &object) > LEAST_PIVOT) {
+            return Err(ModelError::NoMass);
         }
+        if plant.model.joint_limits {
+            plant.limits = limits(&plant.coupling.mass, plant.model.hand.joint_count(), substep_s);
+        }
+        Ok(plant)
     }
 
     /// The model.
@@ -307,7 +314,7 @@ impl Plant {
         let model = &self.model;
         model.hand.forward_kinematics(&self.motion.angles_rad, &mut self.posture);
         place_bodies(&model.hand, &self.posture, &mut self.bodies);
-        mass_matrix(&model.hand, &self.bodies, &mut self.mass);
+        model.mass_matrix(&self.bodies, &mut self.mass);
         let attitude = self.motion.attitude.to_rotation_matrix().into_inner();
         self.contacts.clear();
         for ((fingertip, face), centre) in
@@ -354,7 +361,16 @@ impl Plant {
         let gravity = &self.model.hand_gravity_m_s2;
         let bias = bias_torques(&self.model.hand, &self.bodies, speeds, gravity);
         for (k, friction) in self.model.friction.iter().enumerate() {
-            let friction = torque(friction, self.stretch_rad[k], speeds[k]);
+            let mut friction = torque(friction, self.stretch_rad[k], speeds[k]);
+            if let Some(end) = self.limits.get(k) {
+                add_limit(
+                    &mut friction,
+                    end,
+                    self.model.hand.range_rad(k),
+                    self.motion.angles_rad[k],
+                    speeds[k],
+                );
+            }
             self.friction[k] = friction;
             push.joints[k] =
                 torques_nm[k] - bias[k] - friction.torque_nm - friction.damping_nm_s * self.before.joints[k];
@@ -417,6 +433,22 @@ impl Plant {
         flows.velocity_squared = object[..3].iter().map(|v| v * v).sum();
         flows.spin_squared = tail(object).norm_squared();
         flows
+    }
+}
+
+/// Adds the end of a joint's range to its friction. It is damped on the way in, so that it does not hold a joint that leaves.
+fn add_limit(
+    friction: &mut FrictionTorque,
+    end: &Material,
+    (lower_rad, upper_rad): (f64, f64),
+    angle_rad: f64,
+    speed_rad_s: f64,
+) {
+    let beyond_rad = angle_rad - angle_rad.clamp(lower_rad, upper_rad);
+    if beyond_rad != 0.0 {
+        friction.torque_nm += end.linear_n_m * beyond_rad;
+        friction.stiffness_nm += end.linear_n_m;
+        friction.damping_nm_s += if speed_rad_s * beyond_rad > 0.0 { end.damping[0] } else { 0.0 };
     }
 }
 

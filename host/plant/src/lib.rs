@@ -1,6 +1,7 @@
-//! The simulated plant: hand, free rigid object, and soft fingertips that roll on its faces (Eqs. 1-28).
+//! The simulated plant: hand, free rigid object, and soft fingertips that roll on its faces (Eqs. 1-28), or that stick and slip on it.
 //!
-//! [`model`] says what is simulated, [`integrator`] advances it in time. The parts: the hand's [`dynamics`](blindgrasp_body::dynamics), [`contact`] of a
+//! [`model`] says what is simulated, [`integrator`] advances it in time; [`coulomb`] does where contacts have friction, and
+//! [`Plant`] is either. The parts: the hand's [`dynamics`](blindgrasp_body::dynamics), [`contact`] of a
 //! fingertip with a face, joint [`friction`], `rotation` of the object, and `coupling`, the linear algebra that solves for all of
 //! them together. A `push` comes from outside. A [`ledger`] is kept of the energy that flows in and out.
 
@@ -13,11 +14,12 @@ pub mod ledger;
 mod linear;
 mod mass;
 pub mod model;
+mod plant;
 mod push;
 mod rotation;
 mod surroundings;
 mod vectors;
 
-pub use integrator::Plant;
 pub use ledger::Flows;
 pub use model::{ContactForce, Lost, ModelError, Motion, ObjectModel, PlantModel};
+pub use plant::{FingerContact, FrictionState, Plant, TableContact};

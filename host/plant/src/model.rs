@@ -1,6 +1,6 @@
 //! The simulated world: the model that does not change, and the motion that does.
 
-use blindgrasp_body::dynamics::JointVector;
+use blindgrasp_body::dynamics::{Body, JointMatrix, JointVector, mass_matrix};
 use blindgrasp_body::polyhedron::Polyhedron;
 use blindgrasp_body::{FaceContact, FingertipModel, Hand, JointFriction, MAX_CHAIN, MAX_JOINTS, Push};
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
@@ -25,6 +25,10 @@ pub struct PlantModel {
     pub fingertips: Vec<FingertipModel>,
     /// One a joint.
     pub friction: Vec<JointFriction>,
+    /// Inertia of each joint's rotor as the joint feels it, times the gear squared, kg m^2; none for joints left out.
+    pub rotor_inertia_kg_m2: Vec<f64>,
+    /// `true` if the joints stop at the ends of their ranges.
+    pub joint_limits: bool,
     /// The object.
     pub object: ObjectModel,
     /// The face that each fingertip rolls on.
@@ -35,6 +39,16 @@ pub struct PlantModel {
     pub object_gravity_m_s2: Vector3<f64>,
     /// The pushes at the object from outside.
     pub pushes: Vec<Push>,
+}
+
+impl PlantModel {
+    /// Sets the mass matrix of the hand, rotors included.
+    pub(crate) fn mass_matrix(&self, bodies: &[Body; MAX_JOINTS], mass: &mut JointMatrix) {
+        mass_matrix(&self.hand, bodies, mass);
+        for (k, rotor) in self.rotor_inertia_kg_m2.iter().enumerate() {
+            mass[k][k] += rotor;
+        }
+    }
 }
 
 /// The positions and velocities of everything at one instant.
@@ -89,6 +103,18 @@ pub enum Lost {
         /// The finger, from 0.
         finger: usize,
     },
+    /// No fingertip has touched the object for a while.
+    #[error("the object fell out of the hand: no fingertip touches it")]
+    Untouched,
+    /// The object is more than its own size away from where the hand had it.
+    #[error("the object is more than its own size away from where the hand had it")]
+    Away,
+    /// The object went with the table when that went away.
+    #[error("the object stayed on the table")]
+    OnTable,
+    /// No two fingertips ever touched the object at once.
+    #[error("the object was never grasped: no two fingertips ever touched it at once")]
+    NeverGrasped,
     /// The rolling constraints are no longer independent (Eq. 28 has no solution).
     #[error("the rolling constraints became dependent")]
     Rank,

@@ -176,7 +176,9 @@ mod tests {
         }
         assert!((MOST_WAITING..MOST_WAITING + (1 << 15)).contains(&read.len()), "{} bytes", read.len());
         // In order up to the first that was lost; behind it the kernel may have made room in the middle of a frame.
-        assert!(read.iter().zip(frame.iter().cycle()).take(MOST_WAITING).all(|(byte, expected)| byte == expected));
+        assert!(
+            read.iter().zip(frame.iter().cycle()).take(MOST_WAITING).all(|(byte, expected)| byte == expected)
+        );
         // What nobody has read is not for the next.
         for _ in 0..1000 {
             pty.send(&frame).expect("nothing is wrong");

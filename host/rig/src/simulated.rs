@@ -9,7 +9,7 @@ use super::pil::{PilError, Plan};
 use blindgrasp_body::dynamics::JointVector;
 use blindgrasp_body::{MAX_FINGERS, MAX_JOINTS};
 use blindgrasp_model::{HandModel, Scene};
-use blindgrasp_plant::{Lost, ModelError, Plant};
+use blindgrasp_plant::{Lost, Plant};
 use blindgrasp_shared::device::{Device, Inputs, Outputs};
 use blindgrasp_shared::fault::{Fault, Raised};
 use blindgrasp_shared::identity::{Clock, Identity, Image, ResetCause};
@@ -18,10 +18,11 @@ use blindgrasp_shared::link::rate::FASTER_BAUDS;
 use blindgrasp_shared::supervisor::Mode;
 use blindgrasp_shared::telemetry::INTERFACE_VERSION;
 use blindgrasp_shared::telemetry::burst::Burst;
-use blindgrasp_sim;
+use blindgrasp_sim::SimulationError;
 use blindgrasp_sim::delay::Delay;
 use blindgrasp_sim::encoders::Encoders;
 use blindgrasp_sim::motors::Motors;
+use blindgrasp_sim::verdict::Judge;
 use blindgrasp_wire::Packet;
 
 /// Time that putting the object back takes, s.
@@ -37,7 +38,7 @@ pub enum SimulatedError {
     Plan(#[from] PilError),
     /// It can't be simulated.
     #[error(transparent)]
-    Model(#[from] ModelError),
+    World(#[from] SimulationError),
 }
 
 /// An event in the world, in a tick.
@@ -82,6 +83,7 @@ enum World {
 struct Held {
     plant: Plant,
     motors: Motors,
+    judge: Judge,
     /// For so many ticks.
     ticks: u64,
 }
@@ -196,7 +198,8 @@ impl SimulatedHand {
             World::Still if grasps && self.ready => {
                 self.ready = false;
                 let (plant, motors) = (self.plant.clone(), self.motors.clone());
-                self.world = World::Grasp(Box::new(Held { plant, motors, ticks: 0 }));
+                let judge = Judge::new(self.period_s);
+                self.world = World::Grasp(Box::new(Held { plant, motors, judge, ticks: 0 }));
                 // What goes wrong in the very first tick is found in the next.
                 self.grasp(wanted_nm).or(Some(Happening::Grasped))
             }
@@ -218,9 +221,11 @@ impl SimulatedHand {
 
     fn grasp(&mut self, wanted_nm: &[f32; MAX_JOINTS]) -> Option<Happening> {
         let World::Grasp(held) = &mut self.world else { return None };
-        let Held { plant, motors, ticks } = &mut **held;
+        let Held { plant, motors, judge, ticks } = &mut **held;
         *ticks += 1;
-        let (_, lost) = motors.turn(plant, wanted_nm, |_, _| {}).err()?;
+        let mut gone = None;
+        let moved = motors.turn(plant, wanted_nm, |plant, _| gone = judge.see(plant));
+        let lost = moved.err().map(|(_, lost)| lost).or(gone)?;
         self.world = World::PutBack { from_rad: plant.motion().angles_rad, ticks: 0 };
         Some(Happening::Lost(lost))
     }

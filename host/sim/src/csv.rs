@@ -26,7 +26,7 @@ impl<W: Write> Trace<W> {
 
     fn write(&mut self, sample: &Sample) -> io::Result<()> {
         if self.row.is_empty() {
-            writeln!(self.to, "{}", header(sample.angles_rad.len(), sample.contacts.len()).join(","))?;
+            writeln!(self.to, "{}", header(sample).join(","))?;
         }
         self.row.clear();
         fill(&mut self.row, sample);
@@ -59,7 +59,8 @@ pub fn write(to: impl Write, samples: &[Sample]) -> io::Result<()> {
 }
 
 /// Column names: joints and fingers count from 1. SI units throughout: rad, rad/s, N m, m, m/s, N, J.
-fn header(joints: usize, fingers: usize) -> Vec<String> {
+fn header(sample: &Sample) -> Vec<String> {
+    let (joints, fingers) = (sample.angles_rad.len(), sample.contacts.len());
     let mut names = vec!["t_s".to_owned()];
     for quantity in ["q", "dq", "q_est", "dq_est", "u"] {
         names.extend((1..=joints).map(|k| format!("{quantity}_{k}")));
@@ -74,8 +75,18 @@ fn header(joints: usize, fingers: usize) -> Vec<String> {
     let potentials = GAINS.map(|gain| gain.potential.key.trim_end_matches("_potential_j"));
     let flows = ["motors", "damping", "indentation", "torsion", "friction", "pushes"];
     names.extend(energies.iter().chain(&potentials).chain(&flows).map(|name| format!("{name}_j")));
+    if has_friction(sample) {
+        for finger in 1..=fingers {
+            names.extend(["friction_used", "slipped_m"].map(|quantity| format!("{quantity}_{finger}")));
+        }
+        names.extend(["table_x_N", "table_y_N", "table_z_N", "slip_j", "tables_j"].map(str::to_owned));
+    }
     names.push("mode".to_owned());
     names
+}
+
+fn has_friction(sample: &Sample) -> bool {
+    sample.contacts.iter().any(|contact| contact.friction.is_some())
 }
 
 fn fill(row: &mut Vec<f64>, sample: &Sample) {
@@ -96,4 +107,11 @@ fn fill(row: &mut Vec<f64>, sample: &Sample) {
     row.extend([sample.energy_j, of.kinetic_j, of.elastic_j, of.weight_j]);
     row.extend(of.potentials_j.iter());
     row.extend([of.motors_j, of.damping_j, of.indentation_j, of.torsion_j, of.friction_j, of.pushes_j]);
+    if has_friction(sample) {
+        for friction in sample.contacts.iter().filter_map(|contact| contact.friction) {
+            row.extend([friction.used, friction.slipped_m]);
+        }
+        row.extend(sample.table_force_n().iter());
+        row.extend([of.slip_j, of.tables_j]);
+    }
 }

@@ -23,12 +23,16 @@ pub mod recorder;
 pub mod sample;
 pub mod summary;
 pub mod thinned;
+pub mod verdict;
+mod world;
+
+pub use world::{gravity_m_s2, model, plant, world};
 
 use crate::sample::Sample;
 use blindgrasp_body::MAX_JOINTS;
 use blindgrasp_model::Scene;
-use blindgrasp_model::file::PushFile;
-use blindgrasp_plant::{Lost, ModelError, Motion, ObjectModel, Plant, PlantModel};
+use blindgrasp_plant::coulomb::WorldError;
+use blindgrasp_plant::{Lost, Plant};
 use blindgrasp_shared::command::{Command, Grasp};
 use blindgrasp_shared::control::Laws;
 use blindgrasp_shared::fault::Raised;
@@ -39,18 +43,18 @@ use delay::Delay;
 use encoders::Encoders;
 use injection::{Injection, Injections, Sensing};
 use motors::Motors;
-use nalgebra::Vector3;
 use observe::{Observer, Seen};
 use std::num::NonZeroU64;
 use std::time::{Duration, Instant};
 use summary::{Ending, Summary, Tally};
+use verdict::Judge;
 
 /// The reason for which a scene can't be simulated.
 #[derive(Debug, thiserror::Error)]
 pub enum SimulationError {
     /// The plant has no equations of motion.
     #[error(transparent)]
-    Model(#[from] ModelError),
+    World(#[from] WorldError),
     /// The controller refuses its parameters.
     #[error("control: {0}")]
     Control(#[from] ParameterError),
@@ -97,6 +101,7 @@ pub struct Simulation<C = Alone> {
     controller: C,
     plant: Plant,
     observer: Observer,
+    judge: Judge,
     /// Torques on their way to the motors; `None` until the hand is armed.
     delay: Option<Delay>,
     /// The next tick.
@@ -145,6 +150,7 @@ impl<C: Controller> Simulation<C> {
             encoders: Encoders::new(scene),
             injections: Injections::default(),
             observer: Observer::new(laws(scene)?, &plant),
+            judge: Judge::new(scene.control.period_s),
             controller,
             plant,
             delay: None,
@@ -271,6 +277,8 @@ impl<C: Controller> Simulation<C> {
         let t_s = self.time_s(tick);
         let is_due = tick.is_multiple_of(self.sample_ticks) || tick == self.ticks;
         let mut sample = None;
+        let mut gone = None;
+        let judge = &mut self.judge;
         // 3, 4: actuate, plant; 5: sample.
         let moved = self.motors.turn(&mut self.plant, wanted_nm, |plant, applied_nm| {
             let seen = Seen {
@@ -281,10 +289,11 @@ impl<C: Controller> Simulation<C> {
                 mode: stepped.mode.words(),
             };
             sample = is_due.then(|| observer.sample(t_s, plant, &seen));
+            gone = judge.see(plant);
         });
-        self.lost = moved.err().map(|(substep, lost)| {
+        self.lost = moved.err().map_or(gone.map(|lost| (t_s, lost)), |(substep, lost)| {
             let at_s = (self.period_us * substep as u64) as f64 / (1e6 * self.motors.substeps as f64);
-            (t_s + at_s, lost)
+            Some((t_s + at_s, lost))
         });
         let Some(sample) = sample else { return false };
         self.tally.see(&sample);
@@ -293,40 +302,10 @@ impl<C: Controller> Simulation<C> {
     }
 }
 
-/// The plant of a scene, as everything is at the start.
-///
-/// # Errors
-/// A model that has no equations of motion.
-pub fn plant(scene: &Scene) -> Result<Plant, ModelError> {
-    let mut angles_rad = [0.0; MAX_JOINTS];
-    angles_rad[..scene.start.angles_rad.len()].copy_from_slice(&scene.start.angles_rad);
-    let start = Motion::at_rest(angles_rad, scene.start.position_m, scene.start.attitude);
-    Plant::new(model(scene), start, scene.plant.substep_s)
-}
-
 /// The control laws of a scene in the precision of the plant.
 ///
 /// # Errors
 /// A gain that is out of its range.
 pub fn laws(scene: &Scene) -> Result<Laws<f64, MAX_JOINTS>, ParameterError> {
     scene.laws_config().prepare(&scene.hand)
-}
-
-/// The plant of a scene.
-pub fn model(scene: &Scene) -> PlantModel {
-    let gravity = Vector3::from(scene.plant.gravity_m_s2);
-    PlantModel {
-        hand: scene.hand.clone(),
-        fingertips: scene.fingertips.clone(),
-        friction: scene.joints.iter().map(|joint| joint.friction).collect(),
-        object: ObjectModel {
-            shape: scene.object.clone(),
-            mass_kg: scene.mass_kg,
-            inertia_kg_m2: scene.inertia_kg_m2,
-        },
-        faces: scene.contacts.clone(),
-        hand_gravity_m_s2: gravity,
-        object_gravity_m_s2: if scene.plant.gravity_on_object { gravity } else { Vector3::zeros() },
-        pushes: scene.plant.pushes.iter().map(PushFile::push).collect(),
-    }
 }

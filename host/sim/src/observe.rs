@@ -60,6 +60,8 @@ impl Observer {
             indentation_j: flows.indentation,
             torsion_j: flows.torsion,
             friction_j: flows.friction,
+            slip_j: flows.slip,
+            tables_j: flows.tables,
             joint_speeds_squared: flows.joint_speeds_squared.iter().sum(),
             velocity_squared: flows.velocity_squared,
             spin_squared: flows.spin_squared,
@@ -83,6 +85,7 @@ impl Observer {
             velocity_m_s: motion.velocity_m_s,
             spin_rad_s: motion.spin_rad_s,
             contacts: self.contacts(plant, seen.force_share),
+            tables: plant.on_tables(),
             energy_j: energies.of_equation_40_j(),
             energies,
             mode: seen.mode,
@@ -96,26 +99,27 @@ impl Observer {
         let [force_n, stiffness_nm] = self.laws.gains().grasp;
         let pulls = law.approach_wrenches(hand, posture, force_n);
         let turns = law.attitude_wrenches(hand, posture, &self.latch.grasp, stiffness_nm);
-        let forces = plant.forces().iter().zip(&posture.centres_m);
-        plant
-            .contacts()
+        let fingers = plant.fingers();
+        fingers
             .iter()
-            .zip(forces)
             .zip(pulls.iter().zip(&turns))
-            .map(|((contact, (force, centre)), (pull, turn))| {
+            .map(|(contact, (pull, turn))| {
                 // A (x_c - x_i) and K_st B_sti in the contact frame.
-                let pull = contact.frame.tr_mul(&pull.force_n) * force_share;
+                let full = contact.frame.tr_mul(&pull.force_n);
+                let pull = full * force_share;
                 let turn = contact.frame.tr_mul(&turn.moment_nm);
-                let rho = contact.rolling_radius_m;
+                let (force, rho) = (&contact.force, contact.rolling_radius_m);
                 ContactSample {
                     normal_force_n: force.normal_n,
                     desired_normal_force_n: pull.y,
+                    full_force_n: full.y,
                     lambda_n: [force.lambda_x_n, force.lambda_z_n],
                     torsion_nm: force.torsion_nm,
                     indentation_m: contact.indentation_m,
-                    point_m: contact.point_m(centre),
+                    point_m: contact.point_m,
                     frame: contact.frame,
-                    foot_m: contact.foot_m(),
+                    foot_m: contact.foot_m,
+                    friction: contact.friction,
                     force_residual_n: Vector3::new(
                         -force.lambda_x_n - pull.x,
                         force.normal_n - pull.y,

@@ -1,6 +1,8 @@
 //! One sample a control tick: the state of everything.
 
 use blindgrasp_body::{Hand, MAX_JOINTS, Posture};
+use blindgrasp_plant::coulomb::Pair;
+use blindgrasp_plant::{FrictionState, TableContact};
 use blindgrasp_shared::control::PerGain;
 use nalgebra::{UnitQuaternion, Vector3};
 
@@ -29,6 +31,8 @@ pub struct Sample {
     pub spin_rad_s: Vector3<f64>,
     /// One for each finger.
     pub contacts: Vec<ContactSample>,
+    /// What tables carry.
+    pub tables: Vec<TableContact>,
     /// Energy of Eq. 40 with its constants added, J.
     pub energy_j: f64,
     /// Its parts, and what flowed since the start of the run.
@@ -45,6 +49,12 @@ impl Sample {
             *slot = *angle;
         }
         angles_rad
+    }
+
+    /// The force of tables on the object, N.
+    pub fn table_force_n(&self) -> Vector3<f64> {
+        let on_object = self.tables.iter().filter(|of| matches!(of.pair, Pair::ObjectTable { .. }));
+        on_object.map(|of| of.force_n).sum()
     }
 
     /// The posture of the hand, whose joints are where they were.
@@ -79,6 +89,10 @@ pub struct EnergySample {
     pub torsion_j: f64,
     /// Taken by the friction of the joints, J.
     pub friction_j: f64,
+    /// Taken by the friction of contacts that slip, J.
+    pub slip_j: f64,
+    /// Work of tables that move, J.
+    pub tables_j: f64,
     /// Integral of `|dq|^2`, rad^2/s.
     pub joint_speeds_squared: f64,
     /// Integral of `|dx/dt|^2`, m^2/s.
@@ -98,25 +112,32 @@ impl EnergySample {
         self.kinetic_j + self.elastic_j + self.weight_j
     }
 
+    /// Returns the work that motors, pushes and tables have done, J.
+    pub fn given_j(&self) -> f64 {
+        self.motors_j + self.pushes_j + self.tables_j
+    }
+
     /// Returns the energy that dampers and friction have taken, J; without the law's damping, which is the motors'
     /// work.
     pub fn dissipated_j(&self) -> f64 {
-        self.indentation_j + self.torsion_j + self.friction_j
+        self.indentation_j + self.torsion_j + self.friction_j + self.slip_j
     }
 }
 
-/// One contact at one control tick.
+/// A fingertip against the object at one control tick.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ContactSample {
     /// Normal force `f_i`, N.
     pub normal_force_n: f64,
     /// Desired normal force of Eq. 57, N.
     pub desired_normal_force_n: f64,
+    /// The same once all of the grasping force acts, N.
+    pub full_force_n: f64,
     /// Multipliers `lambda_iX`, `lambda_iZ`, N. The force on the object is `f C_Y - lambda_X C_X - lambda_Z C_Z`.
     pub lambda_n: [f64; 2],
     /// Moment of the torsional viscosity on the object about `C_Y`, N m; on the fingertip it is the opposite.
     pub torsion_nm: f64,
-    /// Indentation `dr_i`, m.
+    /// Indentation `dr_i`, m; negative where there is a gap.
     pub indentation_m: f64,
     /// Contact point `x_Ci`, m.
     pub point_m: Vector3<f64>,
@@ -125,6 +146,8 @@ pub struct ContactSample {
     /// The position of the contact on its face: coordinates along `C_X` and `C_Z` from the foot of the centre of mass,
     /// m.
     pub foot_m: [f64; 2],
+    /// Friction, where contacts have some.
+    pub friction: Option<FrictionState>,
     /// Residual force `Delta lambda_i1` of Eq. 38 in the contact frame, N.
     pub force_residual_n: Vector3<f64>,
     /// Residual moment `Delta lambda_i2` of Eq. 38 in the contact frame, N m.

@@ -1,6 +1,8 @@
 //! The verdict on a run: did the grasp hold, did everything come to rest, with which forces.
 
 use crate::sample::{ContactSample, Sample};
+use crate::verdict::Outcome;
+use blindgrasp_body::MAX_FINGERS;
 use blindgrasp_plant::Lost;
 use serde::{Deserialize, Serialize};
 
@@ -10,6 +12,9 @@ pub const REST_JOINT_SPEED_RAD_S: f64 = 1e-3;
 pub const REST_OBJECT_SPEED_M_S: f64 = 1e-4;
 /// ... if it turns more slowly than this, rad/s.
 pub const REST_OBJECT_SPIN_RAD_S: f64 = 1e-3;
+
+/// Share of the whole desired normal force (Eq. 57) from which on a contact's demand of friction counts.
+pub const FLOOR: f64 = 0.1;
 
 /// Summary of a run, as `--json` prints it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -23,7 +28,10 @@ pub struct Summary {
     pub settled: bool,
     /// The time from which on it was, s.
     pub settle_time_s: Option<f64>,
-    /// `true` if every fingertip stayed on its face to the end.
+    /// The end of the run in a word.
+    #[serde(default)]
+    pub outcome: Outcome,
+    /// `true` if the object was in the hand to the end; where fingertips roll, if every one stayed on its face.
     pub grasp_held: bool,
     /// Time at which the grasp was lost, s.
     pub lost_at_s: Option<f64>,
@@ -34,8 +42,15 @@ pub struct Summary {
     /// The last instant.
     #[serde(rename = "final")]
     pub last: Last,
-    /// Largest ratio of tangential to normal force during the run: the friction coefficient that the grasp asks for.
+    /// Ratio of tangential to normal force, the friction coefficient that the grasp asks for: the largest during the run, of
+    /// fingertips that press with more than a tenth of what Eq. 57 asks of them.
     pub friction_demand_max: f64,
+    /// The same at the last instant.
+    #[serde(default)]
+    pub friction_demand_at_end: f64,
+    /// The largest ratio before each fingertip pressed so much for the first time.
+    #[serde(default)]
+    pub friction_demand_in_first_touch: f64,
     /// Energy of Eq. 40.
     pub energy: Energy,
     /// Computing time, s.
@@ -63,8 +78,14 @@ pub struct Last {
     pub desired_normal_force_n: Vec<f64>,
     /// Tangential force of each finger, N.
     pub tangential_force_n: Vec<f64>,
-    /// Indentation of each fingertip, m.
+    /// Indentation of each fingertip, m; negative where there is a gap.
     pub indentation_m: Vec<f64>,
+    /// Way that each fingertip has slipped on the object since the start, m; none where it can't.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub slipped_m: Vec<f64>,
+    /// Force of tables on the object, N.
+    #[serde(default)]
+    pub table_force_n: f64,
 }
 
 /// Energy of Eq. 40 (with Eq. 18 in place of Eq. 46, and the constant that makes every term positive) over a run.
@@ -99,6 +120,10 @@ pub struct Tally {
     /// Since when everything has been at rest, s.
     resting_since_s: Option<f64>,
     friction_demand_max: f64,
+    friction_demand_in_first_touch: f64,
+    friction_demand_at_end: f64,
+    /// Fingers that have pressed enough for their demand to count.
+    pressed: [bool; MAX_FINGERS],
     /// The energies of the run, and the least one, J.
     energy: Option<(Energy, f64)>,
 }
@@ -107,8 +132,17 @@ impl Tally {
     /// Takes the next sample.
     pub fn see(&mut self, sample: &Sample) {
         self.resting_since_s = if at_rest(sample) { self.resting_since_s.or(Some(sample.t_s)) } else { None };
-        let demands = sample.contacts.iter().map(friction_demand);
-        self.friction_demand_max = demands.fold(self.friction_demand_max, f64::max);
+        self.friction_demand_at_end = 0.0;
+        for (contact, pressed) in sample.contacts.iter().zip(&mut self.pressed) {
+            let demand = friction_demand(contact);
+            if contact.normal_force_n > FLOOR * contact.full_force_n {
+                *pressed = true;
+                self.friction_demand_at_end = self.friction_demand_at_end.max(demand);
+                self.friction_demand_max = self.friction_demand_max.max(demand);
+            } else if !*pressed {
+                self.friction_demand_in_first_touch = self.friction_demand_in_first_touch.max(demand);
+            }
+        }
         let now_j = sample.energy_j;
         let first = (Energy { initial_j: now_j, ..Energy::default() }, f64::INFINITY);
         let (energy, least_j) = self.energy.get_or_insert(first);
@@ -119,18 +153,22 @@ impl Tally {
 
     /// The verdict on a run whose last sample is `last`.
     pub fn summary(&self, ending: Ending, last: Option<&Sample>) -> Summary {
+        let end = last.map(Last::of).unwrap_or_default();
         let settle_time_s = if ending.lost.is_none() { self.resting_since_s } else { None };
         Summary {
             scene: ending.scene,
             duration_s: ending.duration_s,
             settled: settle_time_s.is_some(),
             settle_time_s,
+            outcome: Outcome::of(ending.lost.map(|(_, lost)| lost), &end.slipped_m),
             grasp_held: ending.lost.is_none(),
             lost_at_s: ending.lost.map(|(t_s, _)| t_s),
             lost_reason: ending.lost.map(|(_, reason)| reason.to_string()),
             fault: ending.fault,
-            last: last.map(Last::of).unwrap_or_default(),
+            last: end,
             friction_demand_max: self.friction_demand_max,
+            friction_demand_at_end: self.friction_demand_at_end,
+            friction_demand_in_first_touch: self.friction_demand_in_first_touch,
             energy: self.energy.map(|(energy, _)| energy).unwrap_or_default(),
             wall_s: ending.wall_s,
             real_time_factor: ending.duration_s / ending.wall_s,
@@ -151,6 +189,8 @@ impl Last {
             desired_normal_force_n: each(|c| c.desired_normal_force_n),
             tangential_force_n: each(ContactSample::tangential_force_n),
             indentation_m: each(|c| c.indentation_m),
+            slipped_m: sample.contacts.iter().filter_map(|c| c.friction.map(|of| of.slipped_m)).collect(),
+            table_force_n: sample.table_force_n().norm(),
         }
     }
 }

@@ -12,6 +12,7 @@ use blindgrasp::sim::recorder::Recorder;
 use blindgrasp::sim::sample::Sample;
 use blindgrasp::sim::summary::Summary;
 use blindgrasp::sim::thinned::Thinned;
+use blindgrasp::sim::verdict::Outcome as Verdict;
 use blindgrasp::view;
 use clap::Args;
 use std::ffi::OsString;
@@ -205,7 +206,12 @@ pub(super) fn describe(summary: &Summary) -> String {
         "grasp",
         match (summary.lost_at_s, &summary.lost_reason) {
             (Some(t_s), Some(reason)) => format!("LOST at {t_s:.3} s: {reason}"),
-            _ => "held".to_owned(),
+            _ => match summary.last.slipped_m.iter().enumerate().max_by(|a, b| a.1.total_cmp(b.1)) {
+                Some((finger, slipped_m)) if summary.outcome == Verdict::Slipped => {
+                    format!("held, but finger {} SLIPPED by {:.1} mm", finger + 1, slipped_m * 1e3)
+                }
+                _ => "held".to_owned(),
+            },
         },
     );
     if let Some(fault) = &summary.fault {
@@ -224,7 +230,12 @@ pub(super) fn describe(summary: &Summary) -> String {
     line("object spin", format!("{:9.2e} rad/s", last.object_spin_rad_s));
     line("residual force", format!("{:9.2e} N     (Eq. 38)", last.force_residual_n));
     line("residual moment", format!("{:9.2e} N m   (Eq. 38)", last.moment_residual_nm));
-    line("friction needed, max", format!("{:9.3}", summary.friction_demand_max));
+    let needed = [
+        ("friction needed, max", summary.friction_demand_max),
+        ("  at the end", summary.friction_demand_at_end),
+        ("  in the first touch", summary.friction_demand_in_first_touch),
+    ];
+    needed.iter().for_each(|(name, demand)| line(name, format!("{demand:9.3}")));
     line(
         "energy",
         format!(
@@ -242,5 +253,9 @@ pub(super) fn describe(summary: &Summary) -> String {
     line("  of Eq. 57, N", row(&last.desired_normal_force_n, 1.0));
     line("tangential force, N", row(&last.tangential_force_n, 1.0));
     line("indentation, mm", row(&last.indentation_m, 1e3));
+    if !last.slipped_m.is_empty() {
+        line("slipped, mm", row(&last.slipped_m, 1e3));
+        line("table carries", format!("{:9.4} N", last.table_force_n));
+    }
     text
 }

@@ -107,6 +107,7 @@ fn mesh(name: &str) -> bool {
         mass_kg: Some(0.1),
         density_kg_m3: None,
         inertia_kg_m2: None,
+        friction: None,
         shape,
     })
 }

@@ -119,12 +119,14 @@ fn sample(t_s: f64) -> Sample {
         ContactSample {
             normal_force_n: desired * (1.0 - (-12.0 * t_s).exp()) + 0.15 * push + impact,
             desired_normal_force_n: desired,
+            full_force_n: desired,
             lambda_n: [0.3 * shear, 0.1 * push + 0.05],
             torsion_nm: 0.0,
             indentation_m: 0.0012,
             point_m: tip - out * (TIP_RADIUS_M - 0.0012),
             frame: Matrix3::from_columns(&[turned, into, turned.cross(&into)]),
             foot_m: [0.0, 0.0],
+            friction: None,
             force_residual_n: Vector3::new(0.3 * shear, 0.2 * push, 1e-6),
             moment_residual_nm: Vector3::new(1e-3 * push, 1e-7, 2e-3 * shear),
         }
@@ -141,6 +143,7 @@ fn sample(t_s: f64) -> Sample {
         velocity_m_s: Vector3::new(0.002 * lift_speed, 0.001 * turn_speed, 0.003 * lift_speed),
         spin_rad_s: Vector3::new(0.05, 0.03, 0.1) * turn_speed,
         contacts: contacts.collect(),
+        tables: Vec::new(),
         energy_j: 0.1,
         energies: EnergySample::default(),
         mode: "grasping",

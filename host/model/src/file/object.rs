@@ -26,6 +26,9 @@ keys! {
         /// that of a uniform body.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         pub inertia_kg_m2: Option<InertiaFile>,
+        /// Coefficient of friction against fingertips; the hand's file may have a lower one.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        pub friction: Option<f64>,
         /// Shape: one of the tables below.
         pub shape: ShapeFile,
     }

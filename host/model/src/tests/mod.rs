@@ -80,7 +80,7 @@ fn shipped_scenes_touch_and_have_no_warnings_but_known_ones() {
         assert_eq!(scene.actuators.output_delay_ticks, u32::from(!ideal), "{name}");
         assert_eq!(scene.control.end_stops, !ideal, "{name}");
         assert_eq!(
-            (scene.control.soft_start_s == 0.0, scene.plant.gravity_on_object),
+            (scene.control.soft_start_s == 0.0, scene.plant.object_has_weight()),
             (ideal, false),
             "{name}"
         );

@@ -16,13 +16,13 @@ use blindgrasp_body::FingertipModel;
 
 /// A soft one-sided contact: polynomials of its depth, which are nothing where it is negative.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(super) struct Material {
+pub(crate) struct Material {
     /// Part of the force that is proportional to the depth, N/m.
-    pub(super) linear_n_m: f64,
+    pub(crate) linear_n_m: f64,
     /// Part that is proportional to its square, N/m^2.
     pub(super) quadratic_n_m2: f64,
     /// Damping coefficient, by powers of the depth, N s/m^(1 + power).
-    pub(super) damping: [f64; 3],
+    pub(crate) damping: [f64; 3],
     /// Depth from which on there is no damping, m.
     pub(super) damped_until_m: f64,
 }

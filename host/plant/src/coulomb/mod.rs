@@ -7,10 +7,10 @@
 
 mod cone;
 mod linear;
-mod material;
+pub(crate) mod material;
 mod plant;
 mod solve;
-mod stiffness;
+pub(crate) mod stiffness;
 mod touch;
 mod world;
 

@@ -12,7 +12,7 @@ use super::material::Response;
 use super::solve::{Counters, Problem};
 use super::stiffness::{Materials, limits};
 use super::touch::{Pair, Placed, Touch};
-use super::world::{World, WorldError};
+use super::world::{Table, World, WorldError};
 use crate::friction::{FrictionTorque, stretch, torque};
 use crate::ledger::Flows;
 use crate::mass::{Branches, MassFactor, ObjectMass};
@@ -22,7 +22,7 @@ use crate::rotation::{solve_inertia, turn_freely};
 use crate::vectors::{Everything, add, combine, dot, head, set_tail, set_velocities, tail, velocities};
 use blindgrasp_body::dynamics::{JointVector, bias_torques};
 use blindgrasp_body::polyhedron::Convex;
-use blindgrasp_body::{MAX_CHAIN, MAX_JOINTS, Posture};
+use blindgrasp_body::{MAX_CHAIN, MAX_FINGERS, MAX_JOINTS, Posture};
 use nalgebra::Vector3;
 
 mod account;
@@ -74,6 +74,8 @@ pub struct Plant {
     problem: Problem,
     projection: Problem,
     contacts: Vec<Contact>,
+    /// Way that each fingertip has slipped on the object, m.
+    slipped_m: [f64; MAX_FINGERS],
     /// Contacts that stuck at the instant before.
     stuck: Vec<Pair>,
     solution: Everything,
@@ -120,6 +122,7 @@ impl Plant {
             problem: Problem::default(),
             projection: Problem::default(),
             contacts: Vec::new(),
+            slipped_m: [0.0; MAX_FINGERS],
             stuck: Vec::new(),
             solution: velocities(&motion),
             pushed: [0.0; 6],
@@ -138,7 +141,7 @@ impl Plant {
         if !(plant.mass.factorize(&plant.now.mass, &[0.0; MAX_JOINTS], &object) > LEAST_PIVOT) {
             return Err(ModelError::NoMass.into());
         }
-        if plant.world.joint_limits {
+        if plant.model.joint_limits {
             plant.materials.limits = limits(&plant.mass, plant.model.hand.joint_count(), substep_s);
         }
         if motion == Motion::at_rest(motion.angles_rad, motion.position_m, motion.attitude) {
@@ -186,6 +189,12 @@ impl Plant {
     /// Counters of what the solver did since the start.
     pub fn counters(&self) -> &Counters {
         &self.problem.counters
+    }
+
+    /// Returns how far a table has gone back from where it was at the start, m.
+    pub fn table_gone_m(&self, table: usize) -> f64 {
+        let Table { point_m, normal, .. } = &self.world.tables[table];
+        normal.dot(&(point_m.at(0.0) - point_m.at(self.time_s())))
     }
 
     /// Kinetic energy, J.
@@ -272,6 +281,7 @@ impl Plant {
         (self.previous, self.before) = (now, after);
         // Half a step on either side of the instant; the start has one side only.
         self.work = self.work.after(&self.power, self.path_s());
+        self.count_slip(self.path_s());
         self.hold_what_sticks();
 
         let motion = &mut self.motion;
@@ -304,8 +314,8 @@ impl Plant {
     }
 
     fn place(&mut self) {
-        let Self { now, model, world, motion, .. } = self;
-        now.place(model, &world.rotor_inertia_kg_m2, &motion.angles_rad, motion.position_m, motion.attitude);
+        let Self { now, model, motion, .. } = self;
+        now.place(model, &motion.angles_rad, motion.position_m, motion.attitude);
     }
 
     /// Adds what acts on joints and object, without contacts; `softness` is what friction adds to the diagonal of the mass

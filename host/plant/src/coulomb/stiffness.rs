@@ -53,7 +53,7 @@ pub(super) fn corner(model: &PlantModel, step_s: f64) -> Material {
 }
 
 /// The materials of the ends of the joints' ranges, by the joints' inertia at the start.
-pub(super) fn limits(mass: &MassFactor, joints: usize, step_s: f64) -> Vec<Material> {
+pub(crate) fn limits(mass: &MassFactor, joints: usize, step_s: f64) -> Vec<Material> {
     let limit = |joint: usize| {
         let mut row = Everything::ZERO;
         row.joints[joint] = 1.0;

@@ -10,7 +10,7 @@ use super::world::{Friction, World};
 use crate::mass::Branches;
 use crate::model::PlantModel;
 use crate::vectors::Everything;
-use blindgrasp_body::dynamics::{Body, JointMatrix, JointVector, mass_matrix, place_bodies};
+use blindgrasp_body::dynamics::{Body, JointMatrix, JointVector, place_bodies};
 use blindgrasp_body::polyhedron::Convex;
 use blindgrasp_body::{FingertipModel, MAX_JOINTS, Posture};
 use blindgrasp_shared::hand::LinkPose;
@@ -169,7 +169,6 @@ impl Placed {
     pub(super) fn place(
         &mut self,
         model: &PlantModel,
-        rotors_kg_m2: &[f64],
         angles_rad: &JointVector,
         position_m: Vector3<f64>,
         attitude: UnitQuaternion<f64>,
@@ -182,15 +181,31 @@ impl Placed {
             self.links[k] = self.posture.link(k);
         }
         place_bodies(hand, &self.posture, &mut self.bodies);
-        mass_matrix(hand, &self.bodies, &mut self.mass);
-        for (k, rotor) in rotors_kg_m2.iter().enumerate() {
-            self.mass[k][k] += rotor;
-        }
+        model.mass_matrix(&self.bodies, &mut self.mass);
     }
 
     /// The object's inertia about its mass centre in base axes, kg m^2.
     pub(super) fn inertia_kg_m2(&self, model: &PlantModel) -> Matrix3<f64> {
         self.turned * model.object.inertia_kg_m2 * self.turned.transpose()
+    }
+
+    /// A fingertip and the object, however far they are from each other.
+    pub(super) fn fingertip_touch(
+        &self,
+        (model, world): (&PlantModel, &World),
+        (shape, materials): (&Convex, &Materials),
+        finger: usize,
+    ) -> Touch {
+        let (centre_m, radius_m) = (self.posture.centres_m[finger], model.fingertips[finger].radius_m);
+        let closest = shape.closest(&self.turned.tr_mul(&(centre_m - self.position_m)));
+        let point_m = self.position_m + self.turned * closest.point_m;
+        let pair = Pair::FingertipObject { finger };
+        Touch {
+            depth_m: radius_m - closest.distance_m,
+            friction: world.fingertip_friction[finger],
+            material: materials.fingertips[finger],
+            ..Touch::new(pair, point_m, -(self.turned * closest.normal))
+        }
     }
 
     /// Gives every pair of bodies closer than a distance, with the tables at a time.
@@ -208,16 +223,9 @@ impl Placed {
             }
         };
         let hand = &model.hand;
-        for (finger, material) in materials.fingertips.iter().enumerate() {
-            let (centre_m, radius_m) = (self.posture.centres_m[finger], model.fingertips[finger].radius_m);
-            let closest = shape.closest(&self.turned.tr_mul(&(centre_m - self.position_m)));
-            let point_m = self.position_m + self.turned * closest.point_m;
-            let pair = Pair::FingertipObject { finger };
-            near(radius_m - closest.distance_m, &|| Touch {
-                friction: world.fingertip_friction[finger],
-                material: *material,
-                ..Touch::new(pair, point_m, -(self.turned * closest.normal))
-            });
+        for finger in 0..materials.fingertips.len() {
+            let touch = self.fingertip_touch((model, world), (shape, materials), finger);
+            near(touch.depth_m, &|| touch);
         }
         for (t, table) in world.tables.iter().enumerate() {
             let origin_m = table.point_m.at(t_s);

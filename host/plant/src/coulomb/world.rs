@@ -1,5 +1,6 @@
-//! The parts of the world that only contact with friction knows: tables, friction, gravity that turns, joint limits, rotors.
+//! The parts of the world that only contact with friction knows: tables, friction, gravity that turns.
 
+pub use blindgrasp_body::ContactFriction as Friction;
 use blindgrasp_body::polyhedron::{Convex, Polyhedron};
 use nalgebra::Vector3;
 use std::fmt;
@@ -33,16 +34,6 @@ impl fmt::Debug for Path {
     }
 }
 
-/// Friction of a contact.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Friction {
-    /// Coefficient of Coulomb friction.
-    pub sliding: f64,
-    /// Largest torsional torque for each newton of normal force, m; it shares the limit with the tangential force, as the
-    /// ellipsoidal limit surface has it.
-    pub torsion_m: f64,
-}
-
 /// A half-space.
 #[derive(Clone, Debug)]
 pub struct Table {
@@ -65,10 +56,6 @@ pub struct World {
     pub tables: Vec<Table>,
     /// Gravity on hand and object, m/s^2, in place of the model's constants: of a hand that is turned or shaken.
     pub gravity_m_s2: Option<Path>,
-    /// The ends of the joints' ranges act.
-    pub joint_limits: bool,
-    /// Inertia of each joint's rotor as the joint feels it, times the gear squared, kg m^2; none for joints left out.
-    pub rotor_inertia_kg_m2: Vec<f64>,
 }
 
 /// The reason for which a world can't be simulated.
@@ -119,8 +106,7 @@ impl World {
                     ("a torsional friction", friction.torsion_m),
                 ]
             })
-            .chain(self.tables.iter().map(|table| ("a table's friction", table.object_friction)))
-            .chain(self.rotor_inertia_kg_m2.iter().map(|&inertia| ("a rotor's inertia", inertia)));
+            .chain(self.tables.iter().map(|table| ("a table's friction", table.object_friction)));
         for (what, value) in numbers {
             if !(value >= 0.0 && value.is_finite()) {
                 return Err(WorldError::Number { what, value });

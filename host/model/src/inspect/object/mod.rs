@@ -201,6 +201,7 @@ fn bare(shape: ShapeFile) -> ObjectFile {
         mass_kg: None,
         density_kg_m3: None,
         inertia_kg_m2: None,
+        friction: None,
         shape,
     }
 }

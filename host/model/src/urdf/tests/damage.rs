@@ -4,6 +4,10 @@ use super::*;
 use blindgrasp_meshes::Numbers;
 use std::time::{Duration, Instant};
 
+/// Time that reading may take on a machine that does other things too; a reader whose time grows with the square of the length
+/// takes minutes.
+const PATIENCE: Duration = Duration::from_secs(10);
+
 /// Replacements for a piece of a URDF.
 const PIECES: [&str; 24] = [
     "", "<", ">", "/", "\"", "=", " ", "&", "&lt;", "<!--", "-->", "0", "-", "1e400", "nan", "-inf", "1e308",
@@ -54,7 +58,7 @@ fn damaged_urdfs_are_refused_or_read_in_bounded_time() {
     }
     println!("{read} read, {refused} refused, the slowest in {slowest:?}");
     assert!(read > 25 && refused > 1000);
-    assert!(slowest < Duration::from_secs(1));
+    assert!(slowest < PATIENCE);
 }
 
 /// Files that are made to take long, each of the largest size that is read.
@@ -106,7 +110,7 @@ fn hostile_urdfs_take_no_time() {
         assert!(error.contains(expected), "{what}: {error}");
         let elapsed = start.elapsed();
         println!("{what}: {:.1} MiB in {elapsed:?}", urdf.len() as f64 / 1048576.0);
-        assert!(elapsed < Duration::from_secs(1), "{what}: {elapsed:?}");
+        assert!(elapsed < PATIENCE, "{what}: {elapsed:?}");
     }
 }
 
@@ -131,5 +135,5 @@ fn the_longest_chain_is_read() {
     println!("2000 links in {:?}", start.elapsed());
     assert_eq!(file.joints.len(), 2);
     assert!((file.joints[0].mass_kg - 1.497).abs() < 1e-12 && (file.joints[1].mass_kg - 0.5).abs() < 1e-12);
-    assert!(start.elapsed() < Duration::from_secs(1));
+    assert!(start.elapsed() < PATIENCE);
 }

@@ -5,9 +5,11 @@ use crate::coulomb::solve::Problem;
 use crate::coulomb::touch::{Pair, Touch};
 use crate::friction::FrictionTorque;
 use crate::ledger::Flows;
+use crate::model::ContactForce;
+use crate::plant::{FingerContact, FrictionState, TableContact};
 use crate::vectors::{dot6, head, tail};
 use blindgrasp_body::dynamics::JointVector;
-use nalgebra::Vector3;
+use nalgebra::{Matrix3, Vector3};
 
 /// A contact's force at one instant.
 #[derive(Clone, Copy, Debug)]
@@ -28,7 +30,81 @@ pub struct Contact {
     pub sticks: bool,
 }
 
+impl Contact {
+    /// Share of the limit of friction that is used: 1 where it slips; 0 where there is none.
+    pub fn used(&self) -> f64 {
+        let limit_n = self.touch.friction.sliding * self.normal_n;
+        if !(limit_n > 0.0) {
+            return 0.0;
+        }
+        if !self.sticks {
+            return 1.0;
+        }
+        let turning_n = match self.touch.tangents() {
+            3 => self.torsion_nm / self.touch.torsion_length_m(),
+            _ => 0.0,
+        };
+        let [x, z] = self.tangential_n;
+        (Vector3::new(x, z, turning_n).norm() / limit_n).min(1.0)
+    }
+
+    /// Force on the second body, N.
+    fn force_n(&self) -> Vector3<f64> {
+        let Touch { normal, tangents: [x, z], .. } = self.touch;
+        normal * self.normal_n + x * self.tangential_n[0] + z * self.tangential_n[1]
+    }
+
+    /// The contact as one with a table, if it is one and carries something.
+    pub(crate) fn on_table(&self) -> Option<TableContact> {
+        self.touch.pair.table().filter(|_| self.normal_n > 0.0)?;
+        // The table is the second body.
+        let (pair, point_m) = (self.touch.pair, self.touch.point_m);
+        Some(TableContact { pair, point_m, force_n: -self.force_n(), used: self.used() })
+    }
+}
+
 impl Plant {
+    /// A fingertip against the object at this instant, after [`Self::solve`].
+    pub(crate) fn finger(&self, finger: usize) -> FingerContact {
+        let pair = Pair::FingertipObject { finger };
+        let known = self.contacts.iter().find(|contact| contact.touch.pair == pair);
+        let touch = known.map_or_else(
+            || self.now.fingertip_touch((&self.model, &self.world), (&self.shape, &self.materials), finger),
+            |contact| contact.touch,
+        );
+        let Touch { normal, tangents: [x, z], point_m, depth_m, .. } = touch;
+        // The frame is right-handed: `C_Z = C_X x C_Y`, which is the second tangent turned round.
+        let force = known.map_or_else(ContactForce::default, |contact| ContactForce {
+            normal_n: contact.normal_n,
+            lambda_x_n: -contact.tangential_n[0],
+            lambda_z_n: contact.tangential_n[1],
+            torsion_nm: contact.torsion_nm,
+        });
+        let lever_m = point_m - self.motion.position_m;
+        FingerContact {
+            frame: Matrix3::from_columns(&[x, normal, -z]),
+            point_m,
+            foot_m: [x.dot(&lever_m), -z.dot(&lever_m)],
+            indentation_m: depth_m,
+            rolling_radius_m: self.model.fingertips[finger].radius_m - depth_m,
+            force,
+            friction: Some(FrictionState {
+                used: known.map_or(0.0, Contact::used),
+                slipped_m: self.slipped_m[finger],
+            }),
+        }
+    }
+
+    /// Adds what contacts of fingertips and object slip in so much time.
+    pub(super) fn count_slip(&mut self, time_s: f64) {
+        for contact in self.contacts.iter().filter(|contact| contact.normal_n > 0.0 && !contact.sticks) {
+            if let Pair::FingertipObject { finger } = contact.touch.pair {
+                let [_, x, z] = contact.velocity_m_s;
+                self.slipped_m[finger] += time_s * x.hypot(z);
+            }
+        }
+    }
+
     /// Powers at this instant, with the velocities that were solved for.
     pub(super) fn powers(&self, torques_nm: &JointVector, tau: f64) -> Flows {
         let mut flows = Flows::NONE;

@@ -24,7 +24,7 @@ impl Plant {
         let inertia = &model.object.inertia_kg_m2;
         let attitude = turn_freely(&motion.attitude, inertia, spin_momentum, 0.5 * h);
         let position_m = motion.position_m + 0.5 * h * head(&before.object);
-        ahead.place(model, &world.rotor_inertia_kg_m2, &angles_rad, position_m, attitude);
+        ahead.place(model, &angles_rad, position_m, attitude);
         let inertia_kg_m2 = ahead.inertia_kg_m2(model);
         let mut half = *before;
         set_tail(&mut half.object, &solve_inertia(&inertia_kg_m2, spin_momentum));

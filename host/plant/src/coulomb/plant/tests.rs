@@ -8,7 +8,7 @@ mod tables;
 
 use super::*;
 use crate::ObjectModel;
-use crate::coulomb::{Friction, Path, Table};
+use crate::coulomb::{Friction, Path};
 use blindgrasp_body::polyhedron::Polyhedron;
 use blindgrasp_body::{FingertipModel, Hand, JointFriction};
 use blindgrasp_shared::hand::{Fingertip, Joint, Link};
@@ -65,6 +65,8 @@ fn model(hand: Hand, object: ObjectModel) -> PlantModel {
     PlantModel {
         fingertips: vec![TIP; hand.fingertip_count()],
         friction: vec![JointFriction::default(); hand.joint_count()],
+        rotor_inertia_kg_m2: Vec::new(),
+        joint_limits: false,
         hand,
         object,
         faces: Vec::new(),

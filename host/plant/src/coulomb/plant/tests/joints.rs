@@ -3,16 +3,11 @@
 use super::*;
 
 /// A hand of two arms of 0.1 m, far from everything, in a world.
-fn arms(change: impl Fn(&mut World)) -> Plant {
+fn arms(change: impl Fn(&mut PlantModel, &mut World)) -> Plant {
     let mut world = world(2, vec![]);
-    change(&mut world);
-    Plant::new(
-        model(no_hand(), object(Polyhedron::cuboid([0.05; 3]).unwrap(), 0.1)),
-        world,
-        at(Vector3::zeros()),
-        5e-4,
-    )
-    .unwrap()
+    let mut model = model(no_hand(), object(Polyhedron::cuboid([0.05; 3]).unwrap(), 0.1));
+    change(&mut model, &mut world);
+    Plant::new(model, world, at(Vector3::zeros()), 5e-4).unwrap()
 }
 
 /// About the joint: a mass in the middle of the arm, and its own inertia.
@@ -24,7 +19,7 @@ const ARM_KG_M2: f64 = 0.02 * (0.05 * 0.05 + 0.01 / 12.0);
 #[test]
 fn a_rotor_adds_its_inertia_to_the_joint() {
     for rotor_kg_m2 in [0.0, 1e-5, 3e-4] {
-        let mut plant = arms(|world| world.rotor_inertia_kg_m2 = vec![rotor_kg_m2; 2]);
+        let mut plant = arms(|model, _| model.rotor_inertia_kg_m2 = vec![rotor_kg_m2; 2]);
         plant.run(&[1e-3], 0.1, |_| {});
         let expected_rad = 0.5 * 1e-3 / (ARM_KG_M2 + rotor_kg_m2) * (0.1 * 0.1);
         let off = plant.motion().angles_rad[0] / expected_rad - 1.0;
@@ -40,11 +35,11 @@ fn a_rotor_adds_its_inertia_to_the_joint() {
 #[test]
 fn an_end_stop_holds_a_joint() {
     const TORQUE_NM: f64 = 0.05;
-    let mut free = arms(|_| {});
+    let mut free = arms(|_, _| {});
     free.run(&[TORQUE_NM], 0.5, |_| {});
     assert!(free.motion().angles_rad[0] > 10.0);
 
-    let mut plant = arms(|world| world.joint_limits = true);
+    let mut plant = arms(|model, _| model.joint_limits = true);
     plant.model.object_gravity_m_s2 = Vector3::zeros();
     let mut deepest_rad: f64 = 0.0;
     plant.run(&[TORQUE_NM], 0.5, |plant| deepest_rad = deepest_rad.max(plant.motion().angles_rad[0] - 1.0));
@@ -69,7 +64,7 @@ fn an_end_stop_holds_a_joint() {
 fn gravity_may_turn() {
     let across = Vector3::new(2.0, -1.0, -9.0);
     let (mut constant, mut path) =
-        (arms(|_| {}), arms(|world| world.gravity_m_s2 = Some(Path::constant(across))));
+        (arms(|_, _| {}), arms(|_, world| world.gravity_m_s2 = Some(Path::constant(across))));
     constant.model.hand_gravity_m_s2 = across;
     constant.model.object_gravity_m_s2 = across;
     for plant in [&mut constant, &mut path] {
@@ -77,7 +72,7 @@ fn gravity_may_turn() {
     }
     assert_eq!(constant.motion(), path.motion());
 
-    let mut turning = arms(|world| {
+    let mut turning = arms(|_, world| {
         world.gravity_m_s2 = Some(Path::new(|t_s| {
             let (sine, cosine) = (5.0 * t_s).sine_cosine();
             Vector3::new(sine, -cosine, 0.0) * GRAVITY_M_S2

@@ -75,10 +75,10 @@ fn any_scene(numbers: &mut Numbers, share: f64) -> (Plant, Vec<f64>) {
     let world = World {
         fingertip_friction: (0..fingers).map(|_| friction(numbers)).collect(),
         tables,
-        joint_limits: numbers.below(2) == 0,
-        rotor_inertia_kg_m2: if numbers.below(2) == 0 { vec![] } else { vec![3e-5; fingers] },
         ..World::default()
     };
+    model.joint_limits = numbers.below(2) == 0;
+    model.rotor_inertia_kg_m2 = if numbers.below(2) == 0 { vec![] } else { vec![3e-5; fingers] };
     let mut start = at(Vector3::zeros());
     start.velocity_m_s = numbers.vector() * 0.5;
     start.spin_rad_s = numbers.vector() * 10.0;

@@ -1,0 +1,147 @@
+//! The checks of a scene's world: contact, friction, tables, gravity that turns.
+
+use super::check::{Result, all_within, fail, item, within};
+use super::file::{PlantSettings, SceneFile};
+use super::{Scene, Start, hand::posture};
+use blindgrasp_body::polyhedron::{Convex, Polyhedron};
+use blindgrasp_body::{ContactFriction, Hand};
+use nalgebra::Vector3;
+
+/// Coefficient of friction where no file gives one: that of rubber on a smooth box.
+const FRICTION: f64 = 0.6;
+/// Torsional friction where no file gives one, m: `3 pi / 16` (that of a round contact with the pressure of Hertz) of a friction
+/// of 0.6 and a contact that is 5.7 mm in radius, as a fingertip of 15 mm has it 1.1 mm deep.
+const TORSIONAL_FRICTION_M: f64 = 2e-3;
+/// Largest coefficient of friction.
+const MOST_FRICTION: f64 = 100.0;
+/// Depth to which the object may lie in a table at the start, m: more than its weight alone presses it in.
+const SUNK_M: f64 = 1e-4;
+/// The most of a table's own length unit that its normal may be off by.
+const OFF_UNIT: f64 = 1e-3;
+
+/// Checks the numbers of the world.
+pub(super) fn settings(plant: &PlantSettings, longest_s: f64) -> Result<()> {
+    if !plant.has_friction() {
+        return paper_only(plant);
+    }
+    within("plant.friction", plant.friction.unwrap_or_default(), 0.0, MOST_FRICTION)?;
+    within("plant.torsional_friction_m", plant.torsional_friction_m.unwrap_or_default(), 0.0, 1.0)?;
+    for (t, table) in plant.tables.iter().enumerate() {
+        let key = |key: &str| item("plant.table", t, key);
+        all_within(&key("point_m"), &table.point_m, 100.0)?;
+        let length = Vector3::from(table.normal).norm();
+        if !((length - 1.0).abs() < OFF_UNIT) {
+            return fail(key("normal"), format!("has length {length}"), "divide it by its length");
+        }
+        within(&key("friction"), table.friction, 0.0, MOST_FRICTION)?;
+        within(&key("fingertip_friction"), table.fingertip_friction, 0.0, MOST_FRICTION)?;
+        for (m, way) in table.moves.iter().enumerate() {
+            let key = |of: &str| item(&key("move"), m, of);
+            within(&key("from_s"), way.from_s, 0.0, longest_s)?;
+            all_within(&key("by_m"), &way.by_m, 100.0)?;
+            if !(way.for_s > 0.0) {
+                let remedy = "give it a length in seconds: a table can't be in two places at once";
+                return fail(key("for_s"), format!("jumps: {:?} s is no time", way.for_s), remedy);
+            }
+            within(&key("for_s"), way.for_s, 1e-2, longest_s)?;
+        }
+    }
+    if !plant.tables.is_empty() && !plant.object_has_weight() {
+        let problem = "an object with a mass but no weight does not lie on a table";
+        return fail("plant.gravity_on_object", problem, "leave it out, or set it to true");
+    }
+    let mut over_s = 0.0;
+    for (k, turn) in plant.turns.iter().enumerate() {
+        let key = |key: &str| item("plant.turn", k, key);
+        within(&key("from_s"), turn.from_s, over_s, longest_s).map_err(|error| super::SceneError {
+            remedy: error.remedy + ": turns follow each other",
+            ..error
+        })?;
+        within(&key("for_s"), turn.for_s, 1e-2, longest_s)?;
+        all_within(&key("gravity_m_s2"), &turn.gravity_m_s2, 1000.0)?;
+        over_s = turn.from_s + turn.for_s;
+    }
+    for (k, shake) in plant.shakes.iter().enumerate() {
+        let key = |key: &str| item("plant.shake", k, key);
+        within(&key("from_s"), shake.from_s, 0.0, longest_s)?;
+        within(&key("for_s"), shake.for_s, 1e-6, longest_s)?;
+        all_within(&key("amplitude_m_s2"), &shake.amplitude_m_s2, 1000.0)?;
+        within(&key("frequency_hz"), shake.frequency_hz, 1e-3, 1e3)?;
+    }
+    Ok(())
+}
+
+/// Refuses what contact that rolls does not know.
+fn paper_only(plant: &PlantSettings) -> Result<()> {
+    let given = [
+        ("plant.friction", plant.friction.is_some()),
+        ("plant.torsional_friction_m", plant.torsional_friction_m.is_some()),
+        ("plant.table", !plant.tables.is_empty()),
+        ("plant.turn", !plant.turns.is_empty()),
+        ("plant.shake", !plant.shakes.is_empty()),
+    ];
+    match given.into_iter().find(|(_, is_given)| *is_given) {
+        None => Ok(()),
+        Some((key, _)) => fail(
+            key,
+            "does nothing where fingertips roll: contact that rolls has neither friction nor a table",
+            "set plant.contact = \"coulomb\", or leave it out",
+        ),
+    }
+}
+
+/// The friction of each fingertip against the object.
+pub(super) fn frictions(file: &SceneFile) -> Vec<ContactFriction> {
+    let plant = &file.plant;
+    let of = |fingertip: &super::file::FingertipFile| {
+        let least = [fingertip.friction, file.object.friction].into_iter().flatten().reduce(f64::min);
+        let torsion_m = plant.torsional_friction_m.or(fingertip.torsional_friction_m);
+        ContactFriction {
+            sliding: plant.friction.or(least).unwrap_or(FRICTION),
+            torsion_m: torsion_m.unwrap_or(TORSIONAL_FRICTION_M),
+        }
+    };
+    file.hand.fingertips.iter().map(of).collect()
+}
+
+/// Checks that the object can touch with friction, and that nothing is inside a table at the start.
+pub(super) fn at_start(file: &SceneFile, hand: &Hand, shape: &Polyhedron, start: &Start) -> Result<()> {
+    if !file.plant.has_friction() {
+        return Ok(());
+    }
+    if Convex::of(shape).is_none() {
+        let problem =
+            format!("object `{}` is not convex, which contact with friction needs", file.object.name);
+        return fail("plant.contact", problem, "set it to \"rolling\", or take the object's convex hull");
+    }
+    let posture = posture(hand, &start.angles_rad);
+    for (t, table) in file.plant.tables.iter().enumerate() {
+        let key = item("plant.table", t, "point_m");
+        let height_m = |point_m: &Vector3<f64>| {
+            Vector3::from(table.normal).dot(&(point_m - Vector3::from(table.point_m)))
+        };
+        for (fingertip, centre_m) in file.hand.fingertips.iter().zip(&posture.centres_m) {
+            let depth_m = fingertip.radius_m - height_m(centre_m);
+            if depth_m > 0.0 {
+                let problem =
+                    format!("fingertip `{}` is {:.3} mm inside the table", fingertip.name, depth_m * 1e3);
+                return fail(key, problem, "move the table, or grasp the object farther from it");
+            }
+        }
+        let corners = shape.vertices_m.iter().map(|corner_m| start.position_m + start.attitude * corner_m);
+        let lowest_m = corners.map(|corner_m| height_m(&corner_m)).fold(f64::INFINITY, f64::min);
+        if lowest_m < -SUNK_M {
+            let problem = format!("the object is {:.3} mm inside the table", -lowest_m * 1e3);
+            return fail(key, problem, "move the table or the object's pose");
+        }
+    }
+    Ok(())
+}
+
+impl Scene {
+    /// Inertia of each joint's rotor as the joint feels it, kg m^2; nothing where rotors don't act.
+    pub fn rotors_kg_m2(&self) -> Vec<f64> {
+        let joints = self.file.hand.joints.iter().filter(|_| self.plant.rotors_turn());
+        joints.map(|joint| joint.rotor_inertia_kg_m2).collect()
+    }
+}
