@@ -144,7 +144,7 @@ pub(super) struct Placed {
     pub(super) angles_rad: JointVector,
     pub(super) position_m: Vector3<f64>,
     pub(super) attitude: UnitQuaternion<f64>,
-    turned: Matrix3<f64>,
+    pub(super) turned: Matrix3<f64>,
     pub(super) posture: Posture,
     links: [LinkPose<f64>; MAX_JOINTS],
     pub(super) bodies: [Body; MAX_JOINTS],

@@ -72,19 +72,23 @@ impl Plant {
             || self.now.fingertip_touch((&self.model, &self.world), (&self.shape, &self.materials), finger),
             |contact| contact.touch,
         );
-        let Touch { normal, tangents: [x, z], point_m, depth_m, .. } = touch;
-        // The frame is right-handed: `C_Z = C_X x C_Y`, which is the second tangent turned round.
+        let Touch { normal, point_m, depth_m, .. } = touch;
+        // As scenes have it: `C_Z` as near to the object's z axis (on faces that look along z, its x axis) as the face allows.
+        let [across, _, along] = [0, 1, 2].map(|k| self.now.turned.column(k).into_owned());
+        let near = if normal.dot(&along).abs() < 0.9 { along } else { across };
+        let z = (near - normal * normal.dot(&near)).normalize();
+        let x = normal.cross(&z);
         let force = known.map_or_else(ContactForce::default, |contact| ContactForce {
             normal_n: contact.normal_n,
-            lambda_x_n: -contact.tangential_n[0],
-            lambda_z_n: contact.tangential_n[1],
+            lambda_x_n: -x.dot(&contact.force_n()),
+            lambda_z_n: -z.dot(&contact.force_n()),
             torsion_nm: contact.torsion_nm,
         });
         let lever_m = point_m - self.motion.position_m;
         FingerContact {
-            frame: Matrix3::from_columns(&[x, normal, -z]),
+            frame: Matrix3::from_columns(&[x, normal, z]),
             point_m,
-            foot_m: [x.dot(&lever_m), -z.dot(&lever_m)],
+            foot_m: [x.dot(&lever_m), z.dot(&lever_m)],
             indentation_m: depth_m,
             rolling_radius_m: self.model.fingertips[finger].radius_m - depth_m,
             force,
