@@ -141,7 +141,7 @@ fn plant(criterion: &mut Criterion) {
     {
         let scene = Scene::load(name, &[]).expect("the scene is built in");
         let (start, torques) = beginning(&scene);
-        let begin = || Plant::new(sim::model(&scene), start, scene.plant.substep_s).expect("a plant");
+        let begin = || Plant::new(sim::model(&scene), start, scene.substep_s).expect("a plant");
         let mut plant = begin();
         let mut steps = 0;
         criterion.bench_function(&format!("plant step ({what})"), |bencher| {

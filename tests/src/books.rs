@@ -85,7 +85,7 @@ pub fn keep(scene: &Scene) -> Vec<Page> {
     };
     let friction = plant.model().friction.clone();
     let joints = scene.joints.len();
-    let substep_s = scene.plant.substep_s;
+    let substep_s = scene.substep_s;
     let mut control = |plant: &Plant, command: Option<Command>| {
         let mut counts = [0; MAX_JOINTS];
         for (k, count) in counts.iter_mut().enumerate().take(joints) {

@@ -208,7 +208,7 @@ pub fn mechanical_energy_j(scene: &Scene, outcome: &Outcome, from: usize) -> Vec
             velocity_m_s: sample.velocity_m_s,
             spin_rad_s: sample.spin_rad_s,
         };
-        let plant = Plant::new(model(scene), motion, scene.plant.substep_s).expect("it ran");
+        let plant = Plant::new(model(scene), motion, scene.substep_s).expect("it ran");
         stored_j(&plant)
     };
     outcome.run.samples[from.min(outcome.run.samples.len())..].iter().map(energy).collect()

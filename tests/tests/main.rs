@@ -23,6 +23,7 @@ mod pushes;
 mod python_client;
 mod robustness;
 mod science;
+mod tables;
 mod telemetry;
 mod two_fingers;
 mod urdf;

@@ -99,6 +99,8 @@ pub struct Scene {
     pub friction: Friction,
     /// The simulated world.
     pub plant: PlantSettings,
+    /// Step of the integrator, s.
+    pub substep_s: f64,
     /// The number of steps of the integrator in one control period.
     pub substeps: usize,
     /// Oddities that can be simulated, in words.

@@ -72,6 +72,8 @@ impl Kind {
                     "prism" "cube" "prism-ideal" "cube-ideal" "prism-normal-only" "cube-normal-only"
                     "hand-arm" "hand-arm-consistent" "hand-arm-firm" "hand-arm-normal-only"
                     "l-bracket" "two-finger-prism" "four-finger-cube" "allegro-like-prism"
+                    "cube-table" "prism-table" "four-finger-cube-table" "allegro-like-prism-table"
+                    "brick-allegro" "over-an-edge" "too-weak"
                 )
             }
             Self::Hand => {
@@ -80,6 +82,7 @@ impl Kind {
             Self::Object => {
                 built_in!("objects":
                     "prism" "cube" "hexagonal-prism" "cuboid" "cuboid-printed" "l-bracket" "octahedron"
+                    "brick" "heavy-cube"
                 )
             }
         }

@@ -18,7 +18,7 @@ pub fn plant(scene: &Scene) -> Result<Plant, SimulationError> {
     let mut angles_rad = [0.0; MAX_JOINTS];
     angles_rad[..scene.start.angles_rad.len()].copy_from_slice(&scene.start.angles_rad);
     let start = Motion::at_rest(angles_rad, scene.start.position_m, scene.start.attitude);
-    Ok(Plant::new(model(scene), world(scene), start, scene.plant.substep_s)?)
+    Ok(Plant::new(model(scene), world(scene), start, scene.substep_s)?)
 }
 
 /// The model of a scene.

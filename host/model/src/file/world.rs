@@ -44,9 +44,9 @@ keys! {
         /// face. `"coulomb"`: fingertips, object and tables touch, stick, slip, let go and come back, with friction.
         #[serde(default)]
         pub contact: ContactLaw,
-        /// Step of the integrator, s; it has to divide `control.period_s`.
-        #[serde(default = "PlantSettings::substep_s")]
-        pub substep_s: f64,
+        /// Step of the integrator, s; it has to divide `control.period_s`. Without it, the longest that does and is at most 0.0005.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        pub substep_s: Option<f64>,
         /// Gravity in the hand's base frame, m/s^2. It acts on the hand; on the object only with `gravity_on_object`.
         #[serde(default = "PlantSettings::gravity_m_s2")]
         pub gravity_m_s2: [f64; 3],
@@ -86,10 +86,6 @@ keys! {
 }
 
 impl PlantSettings {
-    fn substep_s() -> f64 {
-        1e-4
-    }
-
     fn gravity_m_s2() -> [f64; 3] {
         [0.0, 0.0, -9.81]
     }
@@ -119,7 +115,7 @@ impl Default for PlantSettings {
     fn default() -> Self {
         Self {
             contact: ContactLaw::Rolling,
-            substep_s: Self::substep_s(),
+            substep_s: None,
             gravity_m_s2: Self::gravity_m_s2(),
             gravity_on_object: None,
             friction: None,

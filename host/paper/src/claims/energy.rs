@@ -159,7 +159,7 @@ pub(super) fn falls_row(done: &Done) -> Row {
     let taken =
         samples.last().map_or(0.0, |sample| sample.energies.dissipated_j() + sample.energies.damping_j);
     let share = energy.increase_max_j / taken;
-    let sampled = done.scene.control.period_s > done.scene.plant.substep_s;
+    let sampled = done.scene.control.period_s > done.scene.substep_s;
     let holds = share <= RISE;
     let measured = format!(
         "{} J to {} J; largest rise {} J, {} of what was dissipated",
