@@ -85,6 +85,11 @@ impl Plan {
         if scene.sensors.ideal {
             return refuse(IDEAL_SENSORS);
         }
+        if scene.plant.turns.iter().any(|turn| turn.told) {
+            return refuse(
+                "plant.turn: a firmware that grasps can't be told of gravity yet: set told to false",
+            );
+        }
         let hand = HandModel::of(scene)?;
         let mut config = scene.controller_config();
         // How firm a grasp may be asked for is the file's affair: a scene asks for its own.

@@ -7,6 +7,7 @@ use blindgrasp_shared::command::Command;
 use blindgrasp_shared::event::{Event, Events};
 use blindgrasp_shared::fault::Raised;
 use blindgrasp_shared::parameter::ParameterError;
+use blindgrasp_shared::parameters::Parameter;
 use blindgrasp_shared::supervisor::Mode;
 use blindgrasp_shared::telemetry::Record;
 use blindgrasp_shared::tick::{Input, Params, Sensed, State, tick};
@@ -35,6 +36,8 @@ pub struct Turn<'a> {
     pub command: Option<Command>,
     /// The reach of the host.
     pub reach: Reach,
+    /// Gravity in the base frame, m/s^2, where somebody who knows it tells it.
+    pub gravity_m_s2: Option<[f32; 3]>,
 }
 
 /// The part of the host that reaches the hand.
@@ -108,6 +111,10 @@ impl Controller for Alone {
             events: Events::NONE.with(Event::Late, turn.late),
             command: turn.command.filter(|_| turn.reach != Reach::Nothing),
         };
+        for (axis, gravity) in (0..).zip(turn.gravity_m_s2.into_iter().flatten()) {
+            // Where the weight of the links is not held, gravity is not asked for.
+            let _ = self.params.set(Parameter::GRAVITY, axis, gravity);
+        }
         let output = tick(&self.params, &mut self.state, &input);
         let stepped = Stepped {
             torques_nm: output.torques_nm,

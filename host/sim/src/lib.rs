@@ -26,11 +26,11 @@ pub mod thinned;
 pub mod verdict;
 mod world;
 
-pub use world::{gravity_m_s2, model, plant, world};
+pub use world::{model, plant, world};
 
 use crate::sample::Sample;
 use blindgrasp_body::MAX_JOINTS;
-use blindgrasp_model::Scene;
+use blindgrasp_model::{PlantSettings, Scene};
 use blindgrasp_plant::coulomb::WorldError;
 use blindgrasp_plant::{Lost, Plant};
 use blindgrasp_shared::command::{Command, Grasp};
@@ -48,6 +48,7 @@ use std::num::NonZeroU64;
 use std::time::{Duration, Instant};
 use summary::{Ending, Summary, Tally};
 use verdict::Judge;
+use world::told_gravity_m_s2;
 
 /// The reason for which a scene can't be simulated.
 #[derive(Debug, thiserror::Error)]
@@ -98,6 +99,7 @@ pub struct Simulation<C = Alone> {
     ideal: bool,
     encoders: Encoders,
     injections: Injections,
+    settings: PlantSettings,
     controller: C,
     plant: Plant,
     observer: Observer,
@@ -149,6 +151,7 @@ impl<C: Controller> Simulation<C> {
             ideal: scene.sensors.ideal,
             encoders: Encoders::new(scene),
             injections: Injections::default(),
+            settings: scene.plant.clone(),
             observer: Observer::new(laws(scene)?, &plant),
             judge: Judge::new(scene.control.period_s),
             controller,
@@ -264,7 +267,15 @@ impl<C: Controller> Simulation<C> {
             None if self.ideal => Sensed::Ideal { angles_rad: &angles_rad, speeds_rad_s: &speeds_rad_s },
             None => Sensed::Counts(&sensing.counts),
         };
-        self.controller.step(&Turn { sensed, late: sensing.late, command, reach: sensing.reach })
+        let t_s = tick.map_or(0.0, |tick| self.time_s(tick));
+        let gravity_m_s2 = told_gravity_m_s2(&self.settings, t_s).map(|told| told.map(|v| v as f32).into());
+        self.controller.step(&Turn {
+            sensed,
+            late: sensing.late,
+            command,
+            reach: sensing.reach,
+            gravity_m_s2,
+        })
     }
 
     /// Moves the plant on under the torques of one control period. Returns `true` if a sample was made.

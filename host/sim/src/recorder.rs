@@ -13,6 +13,7 @@ use blindgrasp_shared::identity::{Clock, Identity, Image};
 use blindgrasp_shared::link::message::Reply;
 use blindgrasp_shared::telemetry::snapshot::{BYTES_PER_JOINT, PART_BYTES, Part};
 use blindgrasp_shared::telemetry::{INTERFACE_VERSION, List};
+use nalgebra::Vector3;
 use std::path::Path;
 
 /// Ticks from one snapshot to the next.
@@ -27,6 +28,7 @@ pub struct Recorder {
     device: Device,
     period_ns: u64,
     tick: u64,
+    gravity_m_s2: Option<Vector3<f32>>,
     buffer: Vec<u8>,
     failure: Option<RecordingError>,
 }
@@ -67,14 +69,16 @@ impl Recorder {
         writer.about(device, Stamp(0), &about)?;
         writer.parameters(device, Stamp(0), &Setting::all(controller.params()))?;
         let period_ns = u64::from(about.period_us) * 1000;
-        Ok(Self { writer, device, period_ns, tick: 0, buffer: Vec::new(), failure: None })
+        let gravity_m_s2 = controller.params().laws().config().hold.gravity_m_s2;
+        Ok(Self { writer, device, period_ns, tick: 0, gravity_m_s2, buffer: Vec::new(), failure: None })
     }
 
     /// Takes the next step of the run. What can't be written ends the recording, and is told at its end.
     pub fn see(&mut self, step: &Step<'_, Alone>) {
         if self.failure.is_none() {
             let at = Stamp(self.tick * self.period_ns);
-            let written = self.say_tick(at, step.controller);
+            let written =
+                self.say_parameters(at, step.controller).and_then(|()| self.say_tick(at, step.controller));
             self.failure =
                 written.and_then(|()| step.sample.map_or(Ok(()), |sample| self.show(at, sample))).err();
             self.tick += 1;
@@ -93,6 +97,15 @@ impl Recorder {
             contacts: &contacts,
         };
         self.writer.world(self.device, at, &world)
+    }
+
+    /// Gravity is all that changes while the hand grasps.
+    fn say_parameters(&mut self, at: Stamp, controller: &Alone) -> Result<(), RecordingError> {
+        let gravity_m_s2 = controller.params().laws().config().hold.gravity_m_s2;
+        if std::mem::replace(&mut self.gravity_m_s2, gravity_m_s2) == gravity_m_s2 {
+            return Ok(());
+        }
+        self.writer.parameters(self.device, at, &Setting::all(controller.params()))
     }
 
     fn say_tick(&mut self, at: Stamp, controller: &Alone) -> Result<(), RecordingError> {

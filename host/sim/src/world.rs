@@ -81,8 +81,14 @@ fn done(share: f64) -> f64 {
     s * s * s * (10.0 + s * (6.0 * s - 15.0))
 }
 
+/// Gravity at a time as the controller is told of it, m/s^2; `None` as long as it is not.
+pub(crate) fn told_gravity_m_s2(plant: &PlantSettings, t_s: f64) -> Option<Vector3<f64>> {
+    let begun = plant.turns.iter().rfind(|turn| turn.from_s <= t_s)?;
+    begun.told.then(|| gravity_m_s2(plant, t_s))
+}
+
 /// Gravity at a time without shaking, m/s^2.
-pub fn gravity_m_s2(plant: &PlantSettings, t_s: f64) -> Vector3<f64> {
+fn gravity_m_s2(plant: &PlantSettings, t_s: f64) -> Vector3<f64> {
     plant.turns.iter().fold(Vector3::from(plant.gravity_m_s2), |before, turn| {
         turned(&before, &Vector3::from(turn.gravity_m_s2), done((t_s - turn.from_s) / turn.for_s))
     })

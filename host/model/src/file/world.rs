@@ -179,7 +179,7 @@ keys! {
 
 keys! {
     /// A turn of gravity in the base frame of the hand, begun and ended at rest. The hand's base is at rest otherwise: what its
-    /// turning itself would add is neglected. The controller is not told.
+    /// turning itself would add is neglected.
     #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
     #[serde(deny_unknown_fields)]
     pub struct TurnFile {
@@ -189,6 +189,10 @@ keys! {
         pub for_s: f64,
         /// Gravity at its end, m/s^2.
         pub gravity_m_s2: [f64; 3],
+        /// `true`: from its beginning on the controller is told of gravity each tick, as by a robot that knows its wrist; otherwise
+        /// it goes on to believe what it did.
+        #[serde(default)]
+        pub told: bool,
     }
 }
 
