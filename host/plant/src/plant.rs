@@ -41,6 +41,8 @@ pub struct FingerContact {
 pub struct FrictionState {
     /// Share of the limit of friction that is used: 1 where it slips, 0 where nothing touches.
     pub used: f64,
+    /// The largest tangential force that there could be, N.
+    pub limit_n: f64,
     /// Way that it has slipped since the start, m.
     pub slipped_m: f64,
 }
@@ -169,6 +171,14 @@ impl Plant {
             Self::Coulomb(plant) => {
                 (0..plant.model().hand.fingertip_count()).map(|finger| plant.finger(finger)).collect()
             }
+        }
+    }
+
+    /// Tables at this instant: a point of each, m, and its normal.
+    pub fn tables(&self) -> Vec<[Vector3<f64>; 2]> {
+        match self {
+            Self::Rolling(_) => Vec::new(),
+            Self::Coulomb(plant) => plant.tables().collect(),
         }
     }
 

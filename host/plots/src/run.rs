@@ -5,7 +5,7 @@ use super::pens::Dash;
 use super::series;
 use blindgrasp_body::Hand;
 use blindgrasp_sim::sample::{ContactSample, Sample};
-use blindgrasp_view::palette::{BLACK, BLUE, VERMILLION};
+use blindgrasp_view::palette::{BLACK, BLUE, ORANGE, VERMILLION};
 use nalgebra::Vector3;
 
 /// One figure of a run and the name of its files, without the ending.
@@ -102,6 +102,7 @@ pub fn force_panels(hand: &Hand, samples: &[Sample]) -> Vec<Panel> {
     let range = series::linear_range(
         all.flat_map(|c| [c.normal_force_n, c.desired_normal_force_n, c.tangential_force_n()]),
     );
+    let has_friction = samples.iter().flat_map(|s| &s.contacts).any(|c| c.friction.is_some());
     let line = |name: &str, colour, dash, values| Line { name: name.to_owned(), colour, dash, values };
     (0..hand.fingertip_count())
         .map(|finger| Panel {
@@ -109,7 +110,7 @@ pub fn force_panels(hand: &Hand, samples: &[Sample]) -> Vec<Panel> {
             quantity: "force",
             unit: "N",
             axis: Axis::Linear(range.clone()),
-            lines: vec![
+            lines: [
                 line("normal", BLUE, Dash::Solid, of_contact(samples, finger, |c| c.normal_force_n)),
                 line(
                     "tangential",
@@ -123,7 +124,18 @@ pub fn force_panels(hand: &Hand, samples: &[Sample]) -> Vec<Panel> {
                     Dash::Broken(7.0, 5.0),
                     of_contact(samples, finger, |c| c.desired_normal_force_n),
                 ),
-            ],
+            ]
+            .into_iter()
+            .chain(has_friction.then(|| {
+                let limit_n = |c: &ContactSample| c.friction.map_or(f64::NAN, |friction| friction.limit_n);
+                line(
+                    "limit of friction",
+                    ORANGE,
+                    Dash::Broken(2.0, 3.0),
+                    of_contact(samples, finger, limit_n),
+                )
+            }))
+            .collect(),
         })
         .collect()
 }

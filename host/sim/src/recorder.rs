@@ -8,7 +8,8 @@ use super::controller::Alone;
 use super::sample::{ContactSample, Sample};
 use blindgrasp_body::{MAX_FINGERS, MAX_JOINTS};
 use blindgrasp_model::{HandFile, Scene};
-use blindgrasp_record::mcap::{About, Device, RecordingError, Saved, Setting, Stamp, World, Writer};
+use blindgrasp_plant::TableContact;
+use blindgrasp_record::mcap::{About, Contact, Device, RecordingError, Saved, Setting, Stamp, World, Writer};
 use blindgrasp_shared::identity::{Clock, Identity, Image};
 use blindgrasp_shared::link::message::Reply;
 use blindgrasp_shared::telemetry::snapshot::{BYTES_PER_JOINT, PART_BYTES, Part};
@@ -86,8 +87,20 @@ impl Recorder {
     }
 
     fn show(&mut self, at: Stamp, sample: &Sample) -> Result<(), RecordingError> {
-        let contact = |of: &ContactSample| (of.point_m.into(), of.force_on_object_n().into());
+        let contact = |of: &ContactSample| Contact {
+            point_m: of.point_m.into(),
+            force_n: of.force_on_object_n().into(),
+            friction_used: of.friction.map(|friction| friction.used),
+            slipped_m: of.friction.map(|friction| friction.slipped_m),
+        };
+        let on_table = |of: &TableContact| Contact {
+            point_m: of.point_m.into(),
+            force_n: of.force_n.into(),
+            friction_used: Some(of.used),
+            slipped_m: None,
+        };
         let contacts: Vec<_> = sample.contacts.iter().map(contact).collect();
+        let on_tables: Vec<_> = sample.on_tables.iter().map(on_table).collect();
         let world = World {
             position_m: sample.position_m.into(),
             attitude: sample.attitude.coords.into(),
@@ -95,6 +108,7 @@ impl Recorder {
             speeds_rad_s: &sample.speeds_rad_s,
             torques_nm: &sample.torques_nm,
             contacts: &contacts,
+            on_tables: &on_tables,
         };
         self.writer.world(self.device, at, &world)
     }

@@ -32,7 +32,9 @@ pub struct Sample {
     /// One for each finger.
     pub contacts: Vec<ContactSample>,
     /// What tables carry.
-    pub tables: Vec<TableContact>,
+    pub on_tables: Vec<TableContact>,
+    /// Where they are: a point of each, m, and its normal.
+    pub tables: Vec<[Vector3<f64>; 2]>,
     /// Energy of Eq. 40 with its constants added, J.
     pub energy_j: f64,
     /// Its parts, and what flowed since the start of the run.
@@ -53,7 +55,7 @@ impl Sample {
 
     /// The force of tables on the object, N.
     pub fn table_force_n(&self) -> Vector3<f64> {
-        let on_object = self.tables.iter().filter(|of| matches!(of.pair, Pair::ObjectTable { .. }));
+        let on_object = self.on_tables.iter().filter(|of| matches!(of.pair, Pair::ObjectTable { .. }));
         on_object.map(|of| of.force_n).sum()
     }
 

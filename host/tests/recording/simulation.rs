@@ -158,6 +158,10 @@ struct Contact {
     point_m: Vector,
     #[prost(message, required, tag = "2")]
     force_n: Vector,
+    #[prost(double, optional, tag = "3")]
+    friction_used: Option<f64>,
+    #[prost(double, optional, tag = "4")]
+    slipped_m: Option<f64>,
 }
 
 #[derive(Clone, PartialEq, Message)]
@@ -166,6 +170,8 @@ struct Contacts {
     timestamp: prost_types::Timestamp,
     #[prost(message, repeated, tag = "2")]
     contacts: Vec<Contact>,
+    #[prost(message, repeated, tag = "3")]
+    tables: Vec<Contact>,
 }
 
 /// The messages of a topic, which all stand at the times of the ticks that were told to grasp.
@@ -214,6 +220,7 @@ fn the_true_state_of_the_world_is_recorded_to_the_bit() {
             assert_eq!(joint.acceleration, None);
         }
         assert_eq!(contacts[k].contacts.len(), sample.contacts.len());
+        assert!(contacts[k].tables.is_empty());
         for (told, contact) in contacts[k].contacts.iter().zip(&sample.contacts) {
             assert_eq!(told.point_m.bits(), bits(contact.point_m.into()));
             assert_eq!(told.force_n.bits(), bits(contact.force_on_object_n().into()));
@@ -224,6 +231,35 @@ fn the_true_state_of_the_world_is_recorded_to_the_bit() {
             assert!((contact.force_on_object_n() - by_hand).norm() < 1e-12);
         }
     }
+}
+
+/// What only contacts with friction have: how much of it is used, the way slipped, and what tables carry.
+#[test]
+fn friction_and_tables_are_recorded_to_the_bit() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.mcap");
+    let scene = Scene::load("cube-table", &["duration_s=0.05".to_owned()]).unwrap();
+    let samples = run(&scene, &path);
+    let contacts: Vec<Contacts> =
+        truth(&std::fs::read(&path).unwrap(), "/truth/contacts", "blindgrasp.Contacts");
+    assert_eq!(contacts.len(), samples.len());
+    let bits = |v: [f64; 3]| [v[0], v[1], v[2], 0.0].map(f64::to_bits);
+    let mut on_tables = 0;
+    for (told, sample) in contacts.iter().zip(&samples) {
+        for (told, contact) in told.contacts.iter().zip(&sample.contacts) {
+            let friction = contact.friction.unwrap();
+            assert_eq!(told.friction_used.map(f64::to_bits), Some(friction.used.to_bits()));
+            assert_eq!(told.slipped_m.map(f64::to_bits), Some(friction.slipped_m.to_bits()));
+        }
+        assert_eq!(told.tables.len(), sample.on_tables.len());
+        for (told, on_table) in told.tables.iter().zip(&sample.on_tables) {
+            assert_eq!(told.point_m.bits(), bits(on_table.point_m.into()));
+            assert_eq!(told.force_n.bits(), bits(on_table.force_n.into()));
+            assert_eq!((told.friction_used, told.slipped_m), (Some(on_table.used), None));
+            on_tables += 1;
+        }
+    }
+    assert!(on_tables > samples.len(), "the cube lies on more than one corner");
 }
 
 #[test]

@@ -8,14 +8,19 @@ use super::palm::{self, Palm};
 use super::skeleton::{self, Sizes};
 use blindgrasp_body::polyhedron::Polyhedron;
 use blindgrasp_body::{Hand, MAX_JOINTS, Posture};
-use blindgrasp_sim::sample::{ContactSample, Sample};
+use blindgrasp_sim::sample::Sample;
 use nalgebra::Vector3;
 use std::collections::BTreeMap;
 
 const GLASS: Rgb = [132, 178, 212];
 /// Arrows.
 pub(super) const FORCE: Rgb = [250, 226, 60];
+/// Arrows of contacts that slip: their friction is at its limit.
+const SLIPPING: Rgb = [236, 96, 40];
 const EDGE: Rgb = [52, 66, 84];
+const WOOD: Rgb = [196, 168, 132];
+/// Half the side of the piece of a table that is shown, in radii of the object.
+const TABLE: f64 = 2.0;
 
 /// More edges than this are not drawn.
 const MANY_EDGES: usize = 500;
@@ -83,8 +88,17 @@ impl Stage {
         skeleton::add(&mut mesh, report.hand, &posture, &self.sizes, &self.palms);
         if let Some(sample) = sample {
             self.add_object(&mut mesh, report.object, sample);
+            for table in &sample.tables {
+                self.add_table(&mut mesh, table, report);
+            }
             for contact in &sample.contacts {
-                self.add_force(&mut mesh, contact);
+                let slips = contact.friction.is_some_and(|friction| friction.used >= 1.0);
+                let colour = if slips { SLIPPING } else { FORCE };
+                self.add_force(&mut mesh, contact.point_m, contact.force_on_object_n(), colour);
+            }
+            for contact in &sample.on_tables {
+                let colour = if contact.used >= 1.0 { SLIPPING } else { FORCE };
+                self.add_force(&mut mesh, contact.point_m, contact.force_n, colour);
             }
         }
         mesh
@@ -106,9 +120,21 @@ impl Stage {
         }
     }
 
-    /// The force on the object, an arrow that starts at the contact.
-    fn add_force(&self, mesh: &mut Mesh, contact: &ContactSample) {
-        let force = contact.force_on_object_n();
+    /// A piece of a table under where the object was at the start.
+    fn add_table(&self, mesh: &mut Mesh, [point_m, normal]: &[Vector3<f64>; 2], report: &Report<'_>) {
+        let Some(first) = report.samples.first() else { return };
+        let middle_m = first.position_m - normal * normal.dot(&(first.position_m - point_m));
+        let helper = if normal.x.abs() < 0.6 { Vector3::x() } else { Vector3::y() };
+        let across = helper.cross(normal).normalize() * (TABLE * self.object_radius_m);
+        let along = normal.cross(&across);
+        let [a, b, c, d] =
+            [across + along, along - across, -across - along, across - along].map(|corner| middle_m + corner);
+        mesh.pane([a, b, c], *normal, WOOD);
+        mesh.pane([a, c, d], *normal, WOOD);
+    }
+
+    /// A force on the object, an arrow that starts at the contact.
+    fn add_force(&self, mesh: &mut Mesh, point_m: Vector3<f64>, force: Vector3<f64>, colour: Rgb) {
         let length = (force.norm() * self.m_per_n).min(1.3 * self.object_radius_m);
         if !(length > 0.02 * self.object_radius_m) {
             return;
@@ -116,10 +142,10 @@ impl Stage {
         let along = force.normalize();
         let radius = (0.045 * self.object_radius_m).min(0.12 * length);
         let head = (0.24 * self.object_radius_m).min(0.5 * length);
-        let (tail, tip) = (contact.point_m, contact.point_m + along * length);
+        let (tail, tip) = (point_m, point_m + along * length);
         let mut arrow = Mesh::default();
-        arrow.cone([tail, tip - along * head], [radius; 2], ROUND, FORCE);
-        arrow.cone([tip - along * head, tip], [2.4 * radius, 0.0], ROUND, FORCE);
+        arrow.cone([tail, tip - along * head], [radius; 2], ROUND, colour);
+        arrow.cone([tip - along * head, tip], [2.4 * radius, 0.0], ROUND, colour);
         mesh.marks.append(&mut arrow.solid);
     }
 }

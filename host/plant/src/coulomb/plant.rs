@@ -191,6 +191,12 @@ impl Plant {
         &self.problem.counters
     }
 
+    /// Tables at this instant: a point of each, m, and its normal.
+    pub fn tables(&self) -> impl Iterator<Item = [Vector3<f64>; 2]> {
+        let t_s = self.time_s();
+        self.world.tables.iter().map(move |table| [table.point_m.at(t_s), table.normal])
+    }
+
     /// Returns how far a table has gone back from where it was at the start, m.
     pub fn table_gone_m(&self, table: usize) -> f64 {
         let Table { point_m, normal, .. } = &self.world.tables[table];

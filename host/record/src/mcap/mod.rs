@@ -18,7 +18,7 @@
 //! |---|---|---|
 //! | `/truth/object` | `foxglove.FrameTransform` | pose of the frame `object`, whose origin is the centre of mass, in the hand's `base` |
 //! | `/truth/joints` | `foxglove.JointStates` | true angle and speed of each joint, and the torque on it |
-//! | `/truth/contacts` | `blindgrasp.Contacts` | for each finger the contact point and the force on the object, in `base` |
+//! | `/truth/contacts` | `blindgrasp.Contacts` | for each finger the contact point and the force on the object, in `base`, the used share of friction and the way slipped; what tables carry |
 //!
 //! and has its shapes as attachments: `hand.urdf`, and `object.obj`, in metres and in the frame `object`.
 //!
@@ -51,7 +51,7 @@ pub use error::RecordingError;
 pub use finish::{Finished, finish};
 pub use message::{Level, LinkStatus};
 pub use reader::{Damage, Entries, Entry, Place, Recording, What};
-pub use writer::{Saved, World, Writer};
+pub use writer::{Contact, Saved, World, Writer};
 
 use std::collections::BTreeMap;
 

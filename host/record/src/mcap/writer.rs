@@ -2,7 +2,7 @@
 
 mod world;
 
-pub use world::World;
+pub use world::{Contact, World};
 
 use super::about::{About, Setting};
 use super::decoder::{Arrival, Decoded, Track};

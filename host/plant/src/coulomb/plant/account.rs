@@ -94,6 +94,7 @@ impl Plant {
             force,
             friction: Some(FrictionState {
                 used: known.map_or(0.0, Contact::used),
+                limit_n: known.map_or(0.0, |contact| contact.touch.friction.sliding * contact.normal_n),
                 slipped_m: self.slipped_m[finger],
             }),
         }

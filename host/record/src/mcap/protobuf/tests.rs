@@ -293,9 +293,12 @@ import google/protobuf/timestamp.proto
 message Contact
 Message .blindgrasp.Vector3 point_m = 1
 Message .blindgrasp.Vector3 force_n = 2
+optional double friction_used = 3
+optional double slipped_m = 4
 message Contacts
 {time}
 repeated Message .blindgrasp.Contact contacts = 2
+repeated Message .blindgrasp.Contact tables = 3
 schema blindgrasp.Link
 blindgrasp.proto proto3 package blindgrasp
 message Link

@@ -55,11 +55,18 @@ impl Truth {
                 }
             }
             Self::Contacts => {
-                for (point_m, force_n) in world.contacts {
-                    nested(bytes, 2, |bytes| {
-                        vector(bytes, 1, point_m);
-                        vector(bytes, 2, force_n);
-                    });
+                for (number, contacts) in [(2, world.contacts), (3, world.on_tables)] {
+                    for contact in contacts {
+                        nested(bytes, number, |bytes| {
+                            vector(bytes, 1, &contact.point_m);
+                            vector(bytes, 2, &contact.force_n);
+                            for (number, value) in [(3, contact.friction_used), (4, contact.slipped_m)] {
+                                if let Some(value) = value {
+                                    present_double(bytes, number, value);
+                                }
+                            }
+                        });
+                    }
                 }
             }
         }
@@ -79,8 +86,23 @@ pub struct World<'a> {
     pub speeds_rad_s: &'a [f64],
     /// Torques on the joints, N m.
     pub torques_nm: &'a [f64],
-    /// The contact of each finger: its point, m, and the force on the object there, N.
-    pub contacts: &'a [([f64; 3], [f64; 3])],
+    /// The contact of each finger, with the force on the object.
+    pub contacts: &'a [Contact],
+    /// What tables carry, with their forces.
+    pub on_tables: &'a [Contact],
+}
+
+/// A contact at a tick.
+#[derive(Clone, Copy, Debug)]
+pub struct Contact {
+    /// Its place, m.
+    pub point_m: [f64; 3],
+    /// Its force, N.
+    pub force_n: [f64; 3],
+    /// Share of the limit of friction that is used, where there is friction: 1 where it slips.
+    pub friction_used: Option<f64>,
+    /// Way that it has slipped since the start, where that is known, m.
+    pub slipped_m: Option<f64>,
 }
 
 impl Writer {
@@ -169,8 +191,19 @@ fn descriptors(schema: &str) -> Vec<u8> {
         ],
         _ => vec![
             vector3("Vector3"),
-            message("Contact", vec![inner("point_m", 1, "Vector3"), inner("force_n", 2, "Vector3")]),
-            message(name, vec![time, several(inner("contacts", 2, "Contact"))]),
+            message(
+                "Contact",
+                vec![
+                    inner("point_m", 1, "Vector3"),
+                    inner("force_n", 2, "Vector3"),
+                    optional("friction_used", 3),
+                    optional("slipped_m", 4),
+                ],
+            ),
+            message(
+                name,
+                vec![time, several(inner("contacts", 2, "Contact")), several(inner("tables", 3, "Contact"))],
+            ),
         ],
     };
     timed(schema, &messages)
