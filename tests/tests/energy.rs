@@ -14,7 +14,7 @@ fn run(scene: &str, settings: &[&str]) -> Run {
 
 /// Returns the energy that is missing at a sample, J.
 fn missing_j(first: &EnergySample, now: &EnergySample) -> f64 {
-    now.stored_j() - first.stored_j() + now.dissipated_j() - now.motors_j
+    now.stored_j() - first.stored_j() + now.dissipated_j() - now.given_j()
 }
 
 fn most_missing_j(samples: &[Sample]) -> f64 {
@@ -56,7 +56,9 @@ fn the_ledger_closes_in_every_built_in_scene() {
 /// Tolerance: an order of at least 1.8; the largest miss need not be in the same tick with both steps.
 #[test]
 fn what_the_ledger_misses_has_the_order_of_the_integrator() {
-    for name in Scene::built_in() {
+    // Slip that turns round is of first order: where there is friction, tables.rs has what the ledger misses.
+    let rolls = |name: &&str| Scene::load(name, &[]).is_ok_and(|scene| !scene.plant.has_friction());
+    for name in Scene::built_in().filter(rolls) {
         let [coarse, fine] = ["plant.substep_s=1e-4", "plant.substep_s=5e-5"]
             .map(|substep| most_missing_j(&run(name, &["duration_s=1.0", substep]).samples));
         println!("{name}: {coarse:.1e} J, with half the step {fine:.1e} J: order {:.2}", order(coarse, fine));

@@ -34,6 +34,7 @@ mod refusal;
 mod rolling;
 mod search;
 mod stance;
+mod table;
 mod task;
 mod template;
 #[cfg(test)]

@@ -146,7 +146,7 @@ fn the_written_scene_is_the_placement() {
         for any_attitude in [false, true] {
             let case = Case { any_attitude, ..Case::of(like.clone()) };
             let placement = case.place(1).unwrap().remove(0);
-            let text = scene_text(&placement, hand, object);
+            let text = scene_text(&placement, hand, object, "held");
             let read = Scene::parse(&text, "s.toml", Path::new(""), &[])
                 .unwrap_or_else(|error| panic!("{error}\n{text}"));
             assert_eq!(read, placement.scene);

@@ -8,10 +8,11 @@ use std::fmt::Write as _;
 
 /// The scene as a file: reading it gives the placement's scene again. `hand` and `object` are built-in names, or paths
 /// relative to the file.
-pub fn scene_text(placement: &Placement, hand: &str, object: &str) -> String {
+/// `outcome` says in words what a simulation of it came to.
+pub fn scene_text(placement: &Placement, hand: &str, object: &str, outcome: &str) -> String {
     let file = &placement.scene.file;
     let mut text = String::new();
-    head(&mut text, file, hand, object);
+    head(&mut text, file, [hand, object, outcome]);
     pose(&mut text, file);
     contacts(&mut text, placement);
     start(&mut text, file);
@@ -24,7 +25,7 @@ fn quoted(text: &str) -> String {
     toml::Value::from(text).to_string()
 }
 
-fn head(text: &mut String, file: &SceneFile, hand: &str, object: &str) {
+fn head(text: &mut String, file: &SceneFile, [hand, object, outcome]: [&str; 3]) {
     let model = if file.sensors.ideal {
         "# The paper's own model: no friction, true joint angles, no delay, no limits.\n"
     } else {
@@ -33,6 +34,7 @@ fn head(text: &mut String, file: &SceneFile, hand: &str, object: &str) {
     let _ = write!(
         text,
         "# Written by `blindgrasp scene new`: where the fingertips touch, and how the object lies between them.\n{model}\
+         # Simulated before it was written: {outcome}.\n\
          schema = {}\nname = {}\ndescription = {}\nduration_s = {:?}\nseed = {}\nhand = {}\nobject = {}\n",
         file.schema,
         quoted(&file.name),

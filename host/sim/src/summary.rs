@@ -81,7 +81,7 @@ pub struct Last {
     /// Indentation of each fingertip, m; negative where there is a gap.
     pub indentation_m: Vec<f64>,
     /// Way that each fingertip has slipped on the object since the start, m; none where it can't.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    #[serde(default)]
     pub slipped_m: Vec<f64>,
     /// Force of tables on the object, N.
     #[serde(default)]
@@ -234,6 +234,7 @@ mod tests {
             sample.energy_j = random.f64() - 0.5;
             for contact in &mut sample.contacts {
                 contact.normal_force_n = random.f64();
+                contact.full_force_n = 5.0;
                 contact.lambda_n = [random.f64(), random.f64() - 0.5];
                 contact.force_residual_n.fill(0.0);
                 contact.force_residual_n.x = 0.1;
@@ -262,9 +263,20 @@ mod tests {
             let from = (0..samples.len()).find(|&k| samples[k..].iter().all(is_still));
             assert_eq!(summary.settle_time_s, from.map(|k| samples[k].t_s));
             settled += usize::from(summary.settled);
-            let ratios = samples.iter().flat_map(|sample| &sample.contacts);
-            let ratios = ratios.map(|contact| contact.tangential_force_n() / contact.normal_force_n);
-            assert_eq!(summary.friction_demand_max, ratios.fold(0.0, f64::max));
+            let ratio = |contact: &ContactSample| contact.tangential_force_n() / contact.normal_force_n;
+            let most =
+                |contacts: &mut dyn Iterator<Item = &ContactSample>| contacts.map(ratio).fold(0.0, f64::max);
+            let presses = |contact: &ContactSample| contact.normal_force_n > 0.5;
+            let pressed = &mut samples.iter().flat_map(|sample| &sample.contacts).filter(|c| presses(c));
+            assert_eq!(summary.friction_demand_max, most(pressed));
+            let at_end = &mut last.contacts.iter().filter(|contact| presses(contact));
+            assert_eq!(summary.friction_demand_at_end, most(at_end));
+            let first_touch = |finger: usize| {
+                let contacts = samples.iter().map(move |sample| &sample.contacts[finger]);
+                contacts.take_while(|contact| !presses(contact))
+            };
+            let first_touches = &mut (0..first.contacts.len()).flat_map(first_touch);
+            assert_eq!(summary.friction_demand_in_first_touch, most(first_touches));
             assert_eq!((summary.energy.initial_j, summary.energy.final_j), (first.energy_j, last.energy_j));
             let rises = (0..samples.len()).flat_map(|late| (0..=late).map(move |early| (early, late)));
             let rises = rises.map(|(early, late)| samples[late].energy_j - samples[early].energy_j);

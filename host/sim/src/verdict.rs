@@ -7,8 +7,6 @@ use serde::{Deserialize, Serialize};
 
 /// Time without touch, or on a table that goes away, after which an object is lost, s.
 const PATIENCE_S: f64 = 0.2;
-/// Way of a table from where it was, from which on the object should be in the hand, m.
-const TABLE_GONE_M: f64 = 5e-3;
 /// Way that a fingertip may slip in a run while the object counts as held fast, m.
 const SLIPPED_M: f64 = 1e-3;
 
@@ -63,11 +61,13 @@ impl Judge {
         let Plant::Coulomb(friction) = plant else { return None };
         let motion = plant.motion();
         let touching = friction.contacts().iter().filter(|contact| contact.normal_n > 0.0);
+        // A table that has gone by half the object's size should have left it in the hand, however far that has sunk.
+        let half_size_m = plant.model().object.shape.radius_m();
         let (mut fingers, mut on_table) = (0, false);
         for contact in touching {
             match contact.touch.pair {
                 Pair::FingertipObject { .. } => fingers += 1,
-                Pair::ObjectTable { table, .. } => on_table |= friction.table_gone_m(table) > TABLE_GONE_M,
+                Pair::ObjectTable { table, .. } => on_table |= friction.table_gone_m(table) > half_size_m,
                 _ => {}
             }
         }
@@ -83,13 +83,12 @@ impl Judge {
         if fingers >= 2 && self.home_m.is_none() {
             self.home_m = Some(there_m);
         }
-        let size_m = 2.0 * plant.model().object.shape.radius_m();
         match self.home_m {
             None if is_untouched || is_on_table => Some(Lost::NeverGrasped),
             None => None,
             Some(_) if is_untouched => Some(Lost::Untouched),
             Some(_) if is_on_table => Some(Lost::OnTable),
-            Some(home_m) => ((there_m - home_m).norm() > size_m).then_some(Lost::Away),
+            Some(home_m) => ((there_m - home_m).norm() > 2.0 * half_size_m).then_some(Lost::Away),
         }
     }
 }

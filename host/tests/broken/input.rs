@@ -45,6 +45,8 @@ enum Made {
     Folder { folder: bool },
     /// So many zero bytes.
     Zeros { zeros: u64 },
+    /// Another file of the table, and what stands behind it.
+    Like { like: String, tail: String },
     /// A text with a piece that is repeated; `{k}` in it counts from 1.
     Text { head: String, piece: String, times: usize, tail: String },
 }
@@ -69,6 +71,10 @@ impl Input {
                 fs::create_dir(&path).unwrap();
             }
             Made::Zeros { zeros } => File::create(&path).unwrap().set_len(*zeros).unwrap(),
+            Made::Like { like, tail } => {
+                let text = fs::read_to_string(folder.join(like)).unwrap();
+                fs::write(&path, text + tail).unwrap();
+            }
             Made::Text { head, piece, times, tail } => {
                 let mut file = BufWriter::new(File::create(&path).unwrap());
                 file.write_all(head.as_bytes()).unwrap();

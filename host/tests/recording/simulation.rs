@@ -259,7 +259,7 @@ fn friction_and_tables_are_recorded_to_the_bit() {
             on_tables += 1;
         }
     }
-    assert!(on_tables > samples.len(), "the cube lies on more than one corner");
+    assert!(on_tables > 20, "{on_tables}: the cube lies on the table at first");
 }
 
 #[test]

@@ -217,6 +217,14 @@ fn view(report: &Report<'_>, palms: &[Palm], postures: &[Posture]) -> View {
             tips(posture).iter().any(|tip| (tip - centre).dot(&normal) < 0.0)
         })
     });
+    // Where a table is over the hand, the hand looks down: turned over about x, it is as usual.
+    let tables = report.samples.first().map_or(&[][..], |sample| &sample.tables);
+    if tables.first().is_some_and(|[_, normal]| normal.z < -0.5) {
+        let over = |v: Vector3<f64>| Vector3::new(v.x, -v.y, -v.z);
+        let fingers: Vec<_> = fingers.into_iter().map(over).collect();
+        let View { right, up, back } = View::on_grasp(&fingers, &over(object - centre), passes_palm);
+        return View { right: over(right), up: over(up), back: over(back) };
+    }
     View::on_grasp(&fingers, &(object - centre), passes_palm)
 }
 

@@ -153,6 +153,18 @@ keys! {
     }
 }
 
+impl Default for TableFile {
+    fn default() -> Self {
+        Self {
+            point_m: [0.0; 3],
+            normal: Self::normal(),
+            friction: Self::friction(),
+            fingertip_friction: Self::friction(),
+            moves: Vec::new(),
+        }
+    }
+}
+
 impl TableFile {
     fn normal() -> [f64; 3] {
         [0.0, 0.0, 1.0]

@@ -49,7 +49,8 @@ fn shipped_hands_are_models_without_warnings() {
 fn a_model_has_the_configuration_of_its_experiments() {
     for name in Scene::built_in() {
         let scene = load(name, &[]).unwrap();
-        if scene.sensors.ideal {
+        // Those with friction are no experiments of the hands' files: palm down, with forces of their own.
+        if scene.sensors.ideal || scene.plant.has_friction() {
             continue;
         }
         let model = HandModel::load(&scene.file.hand.name).unwrap();

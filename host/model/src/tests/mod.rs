@@ -72,15 +72,18 @@ fn shipped_scenes_touch_and_have_no_warnings_but_known_ones() {
         assert_eq!(scene.warnings, known_warnings(name), "{name}");
         assert!(HandFile::built_in().any(|hand| hand == scene.file.hand.name), "{name}");
         assert!(Kind::Object.built_in().iter().any(|(object, _)| *object == scene.object_name), "{name}");
-        assert_eq!(scene.substeps, 10);
         assert_touches(&scene);
         let ideal = scene.sensors.ideal;
+        assert_eq!(scene.substeps, if ideal { 10 } else { 2 }, "{name}");
         assert_eq!(scene.joints.iter().all(|joint| joint.torque_limit_nm.is_infinite()), ideal, "{name}");
         assert_eq!(scene.joints.iter().all(|joint| joint.friction.coulomb_nm == 0.0), ideal, "{name}");
         assert_eq!(scene.actuators.output_delay_ticks, u32::from(!ideal), "{name}");
         assert_eq!(scene.control.end_stops, !ideal, "{name}");
         assert_eq!(
-            (scene.control.soft_start_s == 0.0, scene.plant.object_has_weight()),
+            (
+                scene.control.soft_start_s == 0.0,
+                scene.plant.object_has_weight() && !scene.plant.has_friction()
+            ),
             (ideal, false),
             "{name}"
         );

@@ -6,8 +6,11 @@ use crate::terminal;
 use anyhow::{Context, bail};
 use blindgrasp::files;
 use blindgrasp::model::file::{ContactFile, SceneFile};
-use blindgrasp::model::{HandFile, ObjectFile, Parts, suggestion};
+use blindgrasp::model::{HandFile, ObjectFile, Parts, Scene, suggestion};
 use blindgrasp::place::{NoPlacement, Reach, Request, place, scene_text, template};
+use blindgrasp::sim::Simulation;
+use blindgrasp::sim::summary::Summary;
+use blindgrasp::sim::verdict::Outcome as Verdict;
 use clap::Args;
 use std::collections::BTreeMap;
 use std::ffi::OsString;
@@ -19,9 +22,11 @@ const LONGEST_LIST: usize = 100;
 /// Find where the fingertips of a hand best touch an object, and write a scene that begins there
 ///
 /// All choices of faces are rated by where the law comes to rest: how far the fingertips roll until u_st holds them, and how
-/// far the faces' edges are; the best that the fingers can reach is written.
+/// far the faces' edges are; the best that the fingers can reach is written: with weight and friction, on a table that goes away.
+/// What a simulation of it comes to is printed, and stands in the file.
 ///
-/// Exit code 0: written; 1: there is no placement, with the reason; 2: bad input or usage.
+/// Exit code 0: written, and held when it was simulated; 1: there is no placement, or it was lost, with the reason; 2: bad input or
+/// usage.
 #[derive(Args)]
 pub(crate) struct Arguments {
     /// A built-in hand, or the path of a hand's file
@@ -34,9 +39,12 @@ pub(crate) struct Arguments {
     /// Overwrite the file
     #[arg(long)]
     force: bool,
-    /// In the paper's own model: no friction, true joint angles, no delay, no limits
+    /// In the paper's own model: no friction in the joints, true joint angles, no delay, no limits; with --rolling
     #[arg(long)]
     ideal: bool,
+    /// In the paper's world: the object has no weight and lies on no table, and fingertips never slip
+    #[arg(long)]
+    rolling: bool,
     /// Put a fingertip (by name, or by number from 1) on a face, by number from 0 (may be repeated)
     #[arg(long = "face", value_name = "FINGER=FACE")]
     faces: Vec<String>,
@@ -83,7 +91,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
         any_position: arguments.position.is_none(),
         any_attitude: arguments.any_attitude,
     };
-    let placements = match place(&request, usize::from(arguments.list)) {
+    let mut placements = match place(&request, usize::from(arguments.list)) {
         Ok(placements) => placements,
         Err(NoPlacement::Input(error)) => return Err(error.into()),
         Err(NoPlacement::None(refusal)) => {
@@ -96,12 +104,51 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
     let references = [(&arguments.hand, "hand"), (&arguments.object, "object")]
         .map(|(name, what)| reference(name, &path).with_context(|| format!("the path of the {what}")));
     let [hand, object] = references;
-    let text = scene_text(&placements[0], &hand?, &object?);
-    let shown = if arguments.json { show::json(&placements, &path)? } else { show::text(&placements) };
+    let is_on_table = !(arguments.ideal || arguments.rolling);
+    if is_on_table && let Some(best) = placements.first_mut() {
+        match best.on_a_table() {
+            Some(file) => best.scene = Scene::build(file)?,
+            None => eprintln!(
+                "blindgrasp: warning: the object is not convex, so that the scene is the paper's world: no weight, no slip"
+            ),
+        }
+    }
+    let summary = Simulation::new(&placements[0].scene)?.run().summary;
+    let outcome = in_words(&summary);
+    let text = scene_text(&placements[0], &hand?, &object?, &outcome);
+    let shown = if arguments.json {
+        show::json(&placements, &path, &summary, &outcome)?
+    } else {
+        show::text(&placements, &outcome)
+    };
     files::write(&path, &text, arguments.force)?;
     print(&shown)?;
     eprintln!("blindgrasp: wrote {}; `blindgrasp sim {}` runs it", path.display(), shown_path(&path));
-    Ok(Outcome::Shown)
+    Ok(if summary.grasp_held { Outcome::Shown } else { Outcome::Failed })
+}
+
+/// What a simulation came to.
+fn in_words(summary: &Summary) -> String {
+    let world = if summary.last.slipped_m.is_empty() {
+        "in the paper's world"
+    } else {
+        "with weight, after the table went away"
+    };
+    match (summary.lost_at_s, &summary.lost_reason, &summary.fault) {
+        (Some(t_s), Some(reason), _) => format!("LOST at {t_s:.2} s: {reason}"),
+        (_, _, Some(fault)) => format!("ended in {fault}"),
+        _ => {
+            let slipped_m = summary.last.slipped_m.iter().copied().fold(0.0, f64::max);
+            let slipped = match summary.outcome {
+                Verdict::Slipped => format!(", but a fingertip slipped by {:.1} mm", slipped_m * 1e3),
+                _ => String::new(),
+            };
+            format!(
+                "held for {:.1} s {world}{slipped}; needs a friction of {:.2}",
+                summary.duration_s, summary.friction_demand_max
+            )
+        }
+    }
 }
 
 fn print(text: &str) -> anyhow::Result<()> {

@@ -2,15 +2,16 @@
 
 use blindgrasp::model::file::SceneFile;
 use blindgrasp::place::{Placement, Refusal};
+use blindgrasp::sim::summary::Summary;
 use serde_json::{Value, json};
 use std::fmt::Write as _;
 use std::path::Path;
 
 /// The best placement in full, and one line for each of the others.
-pub(super) fn text(placements: &[Placement]) -> String {
+pub(super) fn text(placements: &[Placement], outcome: &str) -> String {
     let mut text = String::new();
     if let Some(best) = placements.first() {
-        describe(&mut text, best);
+        describe(&mut text, best, outcome);
     }
     if placements.len() > 1 {
         let _ = write!(
@@ -43,12 +44,13 @@ pub(super) fn text(placements: &[Placement]) -> String {
     text
 }
 
-fn describe(text: &mut String, placement: &Placement) {
+fn describe(text: &mut String, placement: &Placement, outcome: &str) {
     let (scene, quality) = (&placement.scene, &placement.quality);
     let mut line = |name: &str, value: String| {
         let _ = writeln!(text, "{name:<22}{value}");
     };
     line("scene", format!("{}: {}", scene.name, scene.description));
+    line("simulated", outcome.to_owned());
     line("score", format!("{:.3}", quality.score));
     line(
         "chance to hold",
@@ -92,7 +94,12 @@ fn describe(text: &mut String, placement: &Placement) {
 }
 
 /// All of it, for programs.
-pub(super) fn json(placements: &[Placement], path: &Path) -> anyhow::Result<String> {
+pub(super) fn json(
+    placements: &[Placement],
+    path: &Path,
+    summary: &Summary,
+    outcome: &str,
+) -> anyhow::Result<String> {
     let all: Vec<Value> = placements
         .iter()
         .map(|placement| {
@@ -110,7 +117,12 @@ pub(super) fn json(placements: &[Placement], path: &Path) -> anyhow::Result<Stri
             })
         })
         .collect();
-    let whole = json!({ "placed": true, "scene": path.display().to_string(), "placements": all });
+    let whole = json!({
+        "placed": true,
+        "scene": path.display().to_string(),
+        "simulated": { "outcome": summary.outcome, "held": summary.grasp_held, "words": outcome },
+        "placements": all,
+    });
     Ok(serde_json::to_string(&whole)? + "\n")
 }
 
