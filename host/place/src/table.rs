@@ -38,7 +38,7 @@ impl super::Placement {
         let way = MoveFile { from_s: goes_s, for_s: GOING_S, by_m: (down * GOING_M).into() };
         let table = TableFile {
             point_m: (start.position_m + down * (lowest_m - start.position_m.dot(&down))).into(),
-            normal: (-down).into(),
+            normal: (-down).map(|v| v + 0.0).into(),
             moves: vec![way],
             ..TableFile::default()
         };

@@ -109,7 +109,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
         match best.on_a_table() {
             Some(file) => best.scene = Scene::build(file)?,
             None => eprintln!(
-                "blindgrasp: warning: the object is not convex, so that the scene is the paper's world: no weight, no slip"
+                "blindgrasp: the object is not convex, which contact with friction needs: the scene is the paper's world, without weight and slip"
             ),
         }
     }
