@@ -90,6 +90,27 @@ impl Study {
         Outcome { placed, search_s, runs }
     }
 
+    /// Places an object and grasps it with its weight, on a table that goes away, with encoders, delay, limits, friction of the joints
+    /// and of the contacts: with `u_st`, without, and with the earlier law in its place, whose integral has this gain, N m/rad.
+    ///
+    /// # Errors
+    /// Why it is not placed.
+    pub fn on_a_table(&self, object: &ObjectFile, integral_nm_rad: f64) -> Result<[Summary; 3], String> {
+        let mut all = self.hand.place(object.clone(), 1).map_err(|none| none.to_string())?;
+        let Placement { scene, quality } = all.swap_remove(0);
+        let SceneFile { object, pose, contacts, .. } = scene.file;
+        let real = SceneFile { object, pose, contacts, ..self.real.clone() };
+        let scene = Scene::build(real).map_err(|error| error.to_string())?;
+        let file = Placement { scene, quality }.on_a_table().ok_or("not convex")?;
+        let [_, attitude_nm] = file.control.gains.grasp;
+        Ok([(attitude_nm, 0.0), (0.0, 0.0), (0.0, integral_nm_rad)].map(|(attitude_nm, integral_nm_rad)| {
+            let mut file = file.clone();
+            file.control.gains.grasp[1] = attitude_nm;
+            file.control.gains.integral[0] = integral_nm_rad;
+            simulate(&Scene::build(file).expect("the same scene"))
+        }))
+    }
+
     /// All specimens, on all processors, in their order.
     pub fn run_all(&self, specimens: &[Specimen]) -> Vec<Outcome> {
         spread(specimens, |specimen| self.run(specimen))

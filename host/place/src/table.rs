@@ -44,6 +44,7 @@ impl super::Placement {
         };
         let plant = PlantSettings {
             contact: ContactLaw::Coulomb,
+            gravity_on_object: None,
             gravity_m_s2: (down * GRAVITY_M_S2).into(),
             tables: vec![table],
             ..file.plant.clone()
