@@ -1,7 +1,7 @@
 //! The mass matrix of hand and object, factored: block-arrow, since fingers meet only in the trunk.
 
 use super::linear::{backward, factorize, forward};
-use super::vectors::{Everything, OBJECT, dot};
+use super::vectors::{Everything, dot};
 use blindgrasp_body::dynamics::{JointMatrix, JointVector};
 use blindgrasp_body::{Hand, MAX_CHAIN, MAX_FINGERS};
 use blindgrasp_shared::math::Real;
@@ -111,14 +111,6 @@ impl MassFactor {
         self.whiten_head(b);
     }
 
-    /// The same for what is zero in all fingers but one.
-    pub(super) fn whiten_branch(&self, finger: Option<usize>, b: &mut Everything) {
-        if let Some(i) = finger {
-            self.whiten_finger(i, b);
-        }
-        self.whiten_head(b);
-    }
-
     fn whiten_finger(&self, i: usize, b: &mut Everything) {
         let finger = &self.branches.fingers[i];
         let mut part = [0.0; MAX_CHAIN];
@@ -147,13 +139,6 @@ impl MassFactor {
             *v /= self.root_mass;
         }
         forward(&self.inertia_factor, 3, &mut b.object[3..]);
-    }
-
-    /// Scalar product of two vectors, the first of which is zero in all fingers but one.
-    pub(super) fn product(&self, finger: Option<usize>, a: &Everything, b: &Everything) -> f64 {
-        let joints = finger.map_or(&[][..], |i| &self.branches.fingers[i]).iter().chain(&self.branches.trunk);
-        let in_joints: f64 = joints.map(|&k| a.joints[k] * b.joints[k]).sum();
-        in_joints + dot(&a.object, &b.object, OBJECT)
     }
 
     /// `L^-T y`, in place.

@@ -9,6 +9,7 @@ mod cone;
 mod linear;
 pub(crate) mod material;
 mod plant;
+mod rows;
 mod solve;
 pub(crate) mod stiffness;
 mod touch;

@@ -7,8 +7,9 @@
 //!   velocities after that step are projected, orthogonally in the metric of the kinetic energy, onto no slip of all
 //!   sticking contacts where these are half a step later. That only takes energy; it is booked as friction.
 
+use super::linear::{Four, add_scaled};
 use super::material::Response;
-
+use super::rows::Rows;
 use super::solve::{Counters, Problem};
 use super::stiffness::{Materials, limits};
 use super::touch::{Pair, Placed, Touch};
@@ -19,7 +20,7 @@ use crate::mass::{Branches, MassFactor, ObjectMass};
 use crate::model::{Lost, ModelError, Motion, PlantModel};
 use crate::push::share;
 use crate::rotation::{solve_inertia, turn_freely};
-use crate::vectors::{Everything, add, combine, dot, head, set_tail, set_velocities, tail, velocities};
+use crate::vectors::{Everything, add, combine, head, set_tail, set_velocities, tail, velocities};
 use blindgrasp_body::dynamics::{JointVector, bias_torques};
 use blindgrasp_body::polyhedron::Convex;
 use blindgrasp_body::{MAX_CHAIN, MAX_FINGERS, MAX_JOINTS, Posture};
@@ -63,14 +64,17 @@ pub struct Plant {
     now: Placed,
     ahead: Placed,
     mass: MassFactor,
-    /// Contacts at this instant; their rows, times the inverse factor of the mass matrix; and the only finger in which each is
-    /// not zero.
+    /// Contacts at this instant; and in the same order, with room for more, their rows: once the problem is set, times the
+    /// inverse factor of the mass matrix.
     touches: Vec<Touch>,
-    fingers: Vec<Option<usize>>,
-    whitened: Vec<Everything>,
-    /// Rates of the contacts' depths half a step ago; and about now, with velocities extrapolated.
+    rows: Vec<Rows>,
+    /// What contacts felt of the bodies' velocities half a step ago; the rates of their depths then; and about now, with
+    /// velocities extrapolated.
+    felt: Vec<Four>,
     rates_m_s: Vec<f64>,
     guesses_m_s: Vec<f64>,
+    /// Velocities of the contacts' tables, as their rows feel them.
+    tables_m_s: Vec<Four>,
     problem: Problem,
     projection: Problem,
     contacts: Vec<Contact>,
@@ -115,10 +119,11 @@ impl Plant {
             ahead: Placed::new(),
             mass: MassFactor::new(&model.hand),
             touches: Vec::new(),
-            fingers: Vec::new(),
-            whitened: Vec::new(),
+            rows: Vec::new(),
+            felt: Vec::new(),
             rates_m_s: Vec::new(),
             guesses_m_s: Vec::new(),
+            tables_m_s: Vec::new(),
             problem: Problem::default(),
             projection: Problem::default(),
             contacts: Vec::new(),
@@ -253,8 +258,8 @@ impl Plant {
         };
         problem.solve(law, guesses_m_s);
 
-        for (row, force) in self.whitened.iter().zip(&self.problem.forces) {
-            add(&mut push, *force, row);
+        for (rows, forces) in self.rows.iter().zip(&self.problem.forces) {
+            rows.push(&self.mass.branches, forces, &mut push);
         }
         self.mass.unwhiten(&mut push);
         self.solution = self.before;
@@ -372,7 +377,10 @@ impl Plant {
             world,
             shape,
             materials,
+            mass,
             touches,
+            rows,
+            felt,
             rates_m_s,
             before,
             substep_s,
@@ -380,17 +388,25 @@ impl Plant {
             ..
         } = self;
         touches.clear();
+        felt.clear();
         rates_m_s.clear();
         let far_m = FAR_M + 2.0 * *substep_s * fastest;
         now.touches((model, world), (shape, materials), t_s, far_m, |touch| {
-            let table_m_s = table_velocity(world, &touch, (t_s - *substep_s, t_s));
-            let gap_m_s = times(&now.row(model, &touch, 0), before) + touch.normal.dot(&table_m_s);
+            let table_m_s = table_velocity(world, touch, (t_s - *substep_s, t_s));
+            let own = room(rows, touches.len());
+            now.set_rows(&model.hand, &mass.branches, touch, own);
+            let feels = own.times(&mass.branches, before);
+            let gap_m_s = feels[0] + touch.normal.dot(&table_m_s);
             if touch.depth_m + 2.0 * *substep_s * gap_m_s.abs() + NEAR > 0.0 {
-                touches.push(touch);
+                touches.push(*touch);
+                felt.push(feels);
                 rates_m_s.push(-gap_m_s);
                 for sign in [1.0, -1.0].into_iter().filter(|_| *as_rolling) {
                     if let Some(touch) = touch.viscous_torsion(sign, &model.fingertips) {
-                        rates_m_s.push(-times(&now.row(model, &touch, 0), before));
+                        let own = room(rows, touches.len());
+                        now.set_rows(&model.hand, &mass.branches, &touch, own);
+                        felt.push(own.times(&mass.branches, before));
+                        rates_m_s.push(-felt[touches.len()][0]);
                         touches.push(touch);
                     }
                 }
@@ -403,32 +419,30 @@ impl Plant {
         let (t_s, h) = (self.time_s(), self.substep_s);
         let around_s = if self.started { (t_s - h, t_s + h) } else { (t_s, t_s + h) };
         let about_now = velocities(&self.motion);
-        let Self { now, model, world, touches, fingers, whitened, mass, problem, before, .. } = self;
+        let Self { world, touches, rows, felt, contacts, mass, problem, .. } = self;
+        let branches = &mass.branches;
         problem.clear();
         self.guesses_m_s.clear();
-        whitened.clear();
-        fingers.clear();
-        for touch in touches.iter() {
-            problem.add(touch.tangents(), touch.friction.sliding);
+        self.tables_m_s.clear();
+        for (k, (touch, rows)) in touches.iter().zip(rows.iter_mut()).enumerate() {
+            let table_m_s = touch.feels(&table_velocity(world, touch, around_s));
+            self.tables_m_s.push(table_m_s);
+            self.guesses_m_s.push(-rows.times(branches, &about_now)[0] - table_m_s[0]);
+            let mut free = felt[k];
+            add_scaled(&mut free, 1.0, &table_m_s);
+            rows.whiten(mass);
+            add_scaled(&mut free, tau, &rows.times(branches, push));
+            // Contacts seldom come and go: mostly, each has its place of the step before.
+            let is_same = |contact: &&Contact| contact.touch.pair == touch.pair;
+            let last = contacts.get(k).filter(is_same).or_else(|| contacts.iter().find(is_same));
+            problem.add(
+                touch.tangents(),
+                touch.friction.sliding,
+                free,
+                last.map_or([0.0; 4], Contact::forces),
+            );
         }
-        problem.make_room();
-        for touch in touches.iter() {
-            let finger = touch.pair.finger(&mass.branches);
-            let table_m_s = table_velocity(world, touch, around_s);
-            for part in 0..=touch.tangents() {
-                let mut row = now.row(model, touch, part);
-                let along_m_s = touch.along(part, &table_m_s);
-                if part == 0 {
-                    self.guesses_m_s.push(-mass.product(finger, &row, &about_now) - along_m_s);
-                }
-                let before_m_s = mass.product(finger, &row, before) + along_m_s;
-                mass.whiten_branch(finger, &mut row);
-                problem.free[whitened.len()] = before_m_s + tau * mass.product(finger, &row, push);
-                whitened.push(row);
-                fingers.push(finger);
-            }
-        }
-        delassus(mass, fingers, whitened, tau, problem);
+        couple(rows, tau, problem);
     }
 }
 
@@ -460,26 +474,15 @@ fn table_velocity(world: &World, touch: &Touch, (from_s, to_s): (f64, f64)) -> V
     })
 }
 
-/// `tau J M^-1 J^T`.
-fn delassus(
-    mass: &MassFactor,
-    fingers: &[Option<usize>],
-    whitened: &[Everything],
-    tau: f64,
-    problem: &mut Problem,
-) {
-    let n = whitened.len();
-    for (r, a) in whitened.iter().enumerate() {
-        for (s, b) in whitened.iter().enumerate().take(r + 1) {
-            let common = if fingers[r] == fingers[s] { fingers[r] } else { None };
-            let entry = tau * mass.product(common, a, b);
-            problem.delassus[r * n + s] = entry;
-            problem.delassus[s * n + r] = entry;
-        }
+/// The rows of a contact, kept from one step to the next.
+fn room(rows: &mut Vec<Rows>, contact: usize) -> &mut Rows {
+    if rows.len() <= contact {
+        rows.push(Rows::NONE);
     }
+    &mut rows[contact]
 }
 
-/// Product of a row with velocities; or, once both are whitened, with forces.
-fn times(row: &Everything, v: &Everything) -> f64 {
-    dot(&row.joints, &v.joints, MAX_JOINTS) + dot(&row.object, &v.object, 6)
+/// `tau J M^-1 J^T`.
+fn couple(rows: &[Rows], tau: f64, problem: &mut Problem) {
+    problem.couple(|i, j, block| rows[i].multiply(&rows[j], tau, block));
 }

@@ -8,16 +8,20 @@
 //! - `|l_t| <= mu l_n`, and `c_t = 0` inside; on the boundary `c_t` is opposite to `l_t` (maximum dissipation).
 //!
 //! Normal forces are smooth enough for Newton's method, which linearizes them: `f = a + s d'`. What is left is tried first
-//! with every contact sticking; if all forces are in their cones, that is the answer. Else block Gauss-Seidel gets a
-//! semismooth Newton method started (Alart and Curnier 1991, with the scaling of Hueeber, Stadler, Wohlmuth 2008), and
-//! takes over where that fails.
+//! with every contact sticking; if all forces are in their cones, that is the answer. Else it is a semismooth Newton method
+//! (Alart and Curnier 1991, with the scaling of Hueeber, Stadler, Wohlmuth 2008) for friction and normal forces together, which
+//! begins at the forces of the step before. Where that fails, block Gauss-Seidel gets it started from the forces that sticking
+//! would take, and goes on as long as it fails.
 //!
 //! Redundant rows are no error: a box on a table has eight tangential rows of rank three. A proximal term makes the matrix
 //! regular and shares the load out in proportion to the normal forces; one refinement takes its effect on the velocities
 //! away.
 
 use super::cone::{into_ball, length, one_contact};
-use super::linear::{cholesky, cholesky_solve, dot, eliminate};
+use super::linear::{
+    Block, Four, ZERO, add_scaled, add_transposed, eliminate, factorize, product, products, solve, times,
+    transposed,
+};
 use super::material::Response;
 
 #[cfg(test)]
@@ -54,57 +58,72 @@ pub struct Counters {
     pub projections: u64,
 }
 
-/// A contact's place among the rows.
+/// A contact.
 #[derive(Clone, Copy, Debug)]
 struct Place {
-    /// Row of its normal; the tangential ones follow.
-    normal: usize,
     tangents: usize,
     friction: f64,
-    /// The linearized law: `a + s d'`.
+    /// The law at the velocities that were last looked at, and linearized there: `a + s d'`.
+    law: Response,
     a: f64,
     s: f64,
     /// Proximal term of its tangential rows.
     proximal: f64,
+    /// The inverse of their mean diagonal.
+    step: f64,
 }
 
 impl Place {
-    fn tangential(&self) -> std::ops::Range<usize> {
-        self.normal + 1..self.normal + 1 + self.tangents
-    }
-
     /// `1/s`: a pressed contact has `c_n + l_n / s = a / s`.
     fn softness(&self) -> f64 {
         1.0 / self.s
     }
 
-    fn is_soft(&self) -> bool {
-        self.s > 0.0
+    fn radius(&self, forces: &Four) -> f64 {
+        self.friction * forces[0].max(0.0)
     }
 
-    fn radius(&self, forces: &[f64]) -> f64 {
-        self.friction * forces[self.normal].max(0.0)
+    /// Gives rows that the contact has not a diagonal.
+    fn fill(&self, block: &mut Block) {
+        for r in 1 + self.tangents..4 {
+            block[r][r] = 1.0;
+        }
+    }
+
+    /// Adds what the normal's softness and the proximal term add while it sticks.
+    fn soften(&self, block: &mut Block) {
+        block[0][0] += self.softness();
+        for r in 1..=self.tangents {
+            block[r][r] += self.proximal;
+        }
+        self.fill(block);
+    }
+
+    /// The tangential forces that would stick, if the contact's own rows were all there is.
+    fn reach(&self, forces: &Four, velocities: &Four) -> [f64; 3] {
+        std::array::from_fn(|i| forces[i + 1] - self.step * velocities[i + 1])
     }
 }
 
-/// The problem, and the room to solve it in.
+/// The problem, and the room to solve it in. Of a contact's four numbers the first one is along the normal.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Problem {
     places: Vec<Place>,
-    /// Rows.
-    count: usize,
-    /// Delassus matrix, row-major.
-    pub(super) delassus: Vec<f64>,
+    /// Delassus matrix: the block of contacts `i` and `j`, of which `i` comes first, is at `i n + j`.
+    delassus: Vec<Block>,
     /// Velocities without forces.
-    pub(super) free: Vec<f64>,
-    /// Forces: the answer.
-    pub(super) forces: Vec<f64>,
+    pub(super) free: Vec<Four>,
+    /// Forces: a guess, then the answer.
+    pub(super) forces: Vec<Four>,
     /// Velocities with these forces.
-    pub(super) velocities: Vec<f64>,
+    pub(super) velocities: Vec<Four>,
+    /// Where slip is looked for first.
+    guess: Vec<Four>,
     pressed: Vec<bool>,
-    matrix: Vec<f64>,
-    right: Vec<f64>,
-    change: Vec<f64>,
+    /// The contacts that are solved for together, their matrix and right-hand sides.
+    active: Vec<usize>,
+    matrix: Vec<Block>,
+    change: Vec<Four>,
     pub(super) counters: Counters,
 }
 
@@ -112,83 +131,104 @@ impl Problem {
     /// Begins a new problem.
     pub(super) fn clear(&mut self) {
         self.places.clear();
-        self.count = 0;
-    }
-
-    /// Adds a contact with a number of tangential rows. Returns the row of its normal.
-    pub(super) fn add(&mut self, tangents: usize, friction: f64) -> usize {
-        let normal = self.count;
-        self.places.push(Place { normal, tangents, friction, a: 0.0, s: 0.0, proximal: 0.0 });
-        self.count += 1 + tangents;
-        normal
-    }
-
-    /// Makes room for matrix and vectors, all zero.
-    pub(super) fn make_room(&mut self) {
-        let n = self.count;
-        for (room, size) in [
-            (&mut self.delassus, n * n),
-            (&mut self.matrix, n * n),
-            (&mut self.free, n),
-            (&mut self.forces, n),
-            (&mut self.velocities, n),
-            (&mut self.right, n),
-            (&mut self.change, n),
-        ] {
-            room.clear();
-            room.resize(size, 0.0);
+        for numbers in [&mut self.free, &mut self.forces, &mut self.velocities] {
+            numbers.clear();
         }
-        self.pressed.clear();
-        self.pressed.resize(self.places.len(), false);
     }
 
-    /// Returns the tangential rows of a contact if it sticks: its force is inside of the cone.
-    pub(super) fn sticking(&self, contact: usize) -> Option<std::ops::Range<usize>> {
-        let place = &self.places[contact];
-        let rows = place.tangential();
-        let radius = place.radius(&self.forces);
-        let inside = length(&self.forces[rows.clone()]) < radius * (1.0 - 1e-9);
-        (inside && place.tangents > 0).then_some(rows)
+    /// Adds a contact with a number of tangential rows, its velocities without forces, and a guess of the forces.
+    pub(super) fn add(&mut self, tangents: usize, friction: f64, free: Four, forces: Four) {
+        self.places.push(Place {
+            tangents,
+            friction,
+            law: Response::default(),
+            a: 0.0,
+            s: 0.0,
+            proximal: 0.0,
+            step: 1.0,
+        });
+        self.free.push(free);
+        self.forces.push(forces);
+        self.velocities.push([0.0; 4]);
+    }
+
+    /// Sets the Delassus matrix by the blocks of two contacts, of which the first one comes first or is the same.
+    pub(super) fn couple(&mut self, set: impl Fn(usize, usize, &mut Block)) {
+        let n = self.places.len();
+        self.delassus.resize(n * n, ZERO);
+        for i in 0..n {
+            for j in i..n {
+                set(i, j, &mut self.delassus[i * n + j]);
+            }
+        }
+    }
+
+    /// A block of the Delassus matrix.
+    fn block(&self, i: usize, j: usize) -> Block {
+        let n = self.places.len();
+        if i <= j { self.delassus[i * n + j] } else { transposed(&self.delassus[j * n + i]) }
+    }
+
+    /// The contact's force is inside of the cone.
+    pub(super) fn sticks(&self, contact: usize) -> bool {
+        let (place, forces) = (&self.places[contact], &self.forces[contact]);
+        place.tangents > 0 && length(&forces[1..]) < place.radius(forces) * (1.0 - 1e-9)
     }
 
     /// Solves. `law` gives a contact's normal force for the rate of its depth; `rates` are the first guess.
     pub(super) fn solve(&mut self, law: impl Fn(usize, f64) -> Response, rates: &[f64]) {
+        let n = self.places.len();
         self.counters.steps += 1;
-        for (place, rate) in self.places.iter().zip(rates) {
-            self.velocities[place.normal] = -rate;
+        self.guess.clone_from(&self.forces);
+        for (velocities, rate) in self.velocities.iter_mut().zip(rates) {
+            velocities[0] = -rate;
         }
+        for (k, place) in self.places.iter_mut().enumerate() {
+            let own = &self.delassus[k * n + k];
+            let sum: f64 = (1..=place.tangents).map(|r| own[r][r]).sum();
+            place.step = if sum > 0.0 { place.tangents as f64 / sum } else { 1.0 };
+        }
+        self.linearize(&law);
         for _ in 0..LINEARIZATIONS {
             self.counters.linearizations += 1;
-            self.linearize(&law);
+            self.set_proximal();
             if !self.stick() {
                 self.counters.slips += 1;
-                self.slip();
+                self.slip(&law);
             }
-            if self.is_consistent(&law) {
+            self.linearize(&law);
+            if self.is_consistent() {
                 return;
             }
         }
         self.counters.unconverged += 1;
     }
 
+    /// The elastic part of a contact's normal force, N.
+    pub(super) fn elastic_n(&self, contact: usize) -> f64 {
+        self.places[contact].law.elastic_n
+    }
+
     fn linearize(&mut self, law: &impl Fn(usize, f64) -> Response) {
-        let mut most = 0.0f64;
-        for (i, place) in self.places.iter_mut().enumerate() {
-            let rate = -self.velocities[place.normal];
-            let Response { force_n, slope_n_s_m, .. } = law(i, rate);
-            place.s = slope_n_s_m;
-            place.a = force_n - slope_n_s_m * rate;
-            place.proximal = place.friction * force_n.max(0.0);
-            most = most.max(place.proximal);
+        for (i, (place, velocities)) in self.places.iter_mut().zip(&self.velocities).enumerate() {
+            let rate = -velocities[0];
+            place.law = law(i, rate);
+            place.s = place.law.slope_n_s_m;
+            place.a = place.law.force_n - place.s * rate;
         }
-        let (mut sum, mut rows) = (0.0, 0);
-        for place in &self.places {
-            for r in place.tangential() {
-                sum += self.delassus[r * self.count + r];
-                rows += 1;
+    }
+
+    fn set_proximal(&mut self) {
+        let (mut most, mut sum, mut rows) = (0.0f64, 0.0, 0.0);
+        for place in &mut self.places {
+            place.proximal = place.friction * place.law.force_n.max(0.0);
+            most = most.max(place.proximal);
+            if place.tangents > 0 {
+                sum += place.tangents as f64 / place.step;
+                rows += place.tangents as f64;
             }
         }
-        let mean = sum / f64::from(rows.max(1));
+        let mean = if rows > 0.0 { sum / rows } else { 0.0 };
         for place in &mut self.places {
             let share = if most > 0.0 { (place.proximal / most).max(1e-6) } else { 1.0 };
             place.proximal = PROXIMAL * mean / share;
@@ -196,97 +236,103 @@ impl Problem {
     }
 
     /// The normal forces are those of the laws, not only of their linearizations.
-    fn is_consistent(&self, law: &impl Fn(usize, f64) -> Response) -> bool {
-        let normals = || self.places.iter().map(|place| self.forces[place.normal]);
-        let scale = normals().fold(0.0, f64::max);
-        self.places.iter().zip(normals()).enumerate().all(|(i, (place, force))| {
-            let lawful = law(i, -self.velocities[place.normal]).force_n.max(0.0);
-            !((lawful - force).abs() > 10.0 * TOLERANCE * scale.max(lawful))
+    fn is_consistent(&self) -> bool {
+        let scale = self.forces.iter().fold(0.0, |scale: f64, forces| scale.max(forces[0]));
+        self.places.iter().zip(&self.forces).all(|(place, forces)| {
+            let lawful = place.law.force_n.max(0.0);
+            !((lawful - forces[0]).abs() > 10.0 * TOLERANCE * scale.max(lawful))
         })
+    }
+
+    /// Gathers the matrix of the active contacts, on the diagonal and on the right of it.
+    fn gather(&mut self) {
+        let (n, m) = (self.places.len(), self.active.len());
+        self.matrix.resize(m * m, ZERO);
+        self.change.resize(m, [0.0; 4]);
+        for (x, &i) in self.active.iter().enumerate() {
+            for (y, &j) in self.active.iter().enumerate().skip(x) {
+                self.matrix[x * m + y] = self.delassus[i * n + j];
+            }
+        }
     }
 
     /// Tries with every pressed contact sticking. Returns `true` if that is the answer.
     fn stick(&mut self) -> bool {
-        let n = self.count;
-        for (pressed, place) in self.pressed.iter_mut().zip(&self.places) {
-            *pressed = place.is_soft() && place.a - place.s * self.free[place.normal] > 0.0;
+        self.pressed.clear();
+        for (place, free) in self.places.iter().zip(&self.free) {
+            self.pressed.push(place.s > 0.0 && place.a - place.s * free[0] > 0.0);
         }
         for _ in 0..SETS {
-            // A contact that is not pressed keeps its rows, without coupling: its forces are zero.
-            for r in 0..n {
-                self.matrix[r * n..r * n + r + 1].copy_from_slice(&self.delassus[r * n..r * n + r + 1]);
+            self.active.clear();
+            self.active.extend((0..self.pressed.len()).filter(|&k| self.pressed[k]));
+            self.gather();
+            let m = self.active.len();
+            for (x, &k) in self.active.iter().enumerate() {
+                let place = &self.places[k];
+                place.soften(&mut self.matrix[x * m + x]);
+                self.change[x] = self.free[k].map(|free| -free);
+                self.change[x][0] += place.a * place.softness();
             }
-            for (place, &pressed) in self.places.iter().zip(&self.pressed) {
-                let rows = place.normal..place.normal + 1 + place.tangents;
-                for r in rows {
-                    if pressed {
-                        let is_normal = r == place.normal;
-                        self.matrix[r * n + r] += if is_normal { place.softness() } else { place.proximal };
-                        let law = if is_normal { place.a * place.softness() } else { 0.0 };
-                        self.right[r] = law - self.free[r];
-                    } else {
-                        self.matrix[r * n..r * n + r].fill(0.0);
-                        for below in r + 1..n {
-                            self.matrix[below * n + r] = 0.0;
-                        }
-                        self.matrix[r * n + r] = 1.0;
-                        self.right[r] = 0.0;
-                    }
-                }
-            }
-            if !cholesky(&mut self.matrix, n) {
+            if !factorize(&mut self.matrix, m) {
                 return false;
             }
-            self.forces.copy_from_slice(&self.right);
-            cholesky_solve(&self.matrix, n, &mut self.forces);
-            // One refinement: the residual without the proximal term.
-            self.update_velocities();
-            self.change.fill(0.0);
-            for (place, _) in self.places.iter().zip(&self.pressed).filter(|(_, pressed)| **pressed) {
-                let r = place.normal;
-                self.change[r] = (place.a - self.forces[r]) * place.softness() - self.velocities[r];
-                for r in place.tangential() {
-                    self.change[r] = -self.velocities[r];
-                }
+            solve(&self.matrix, m, &mut self.change);
+            self.forces.fill([0.0; 4]);
+            // One refinement: the velocities that the proximal term has left.
+            for (&k, change) in self.active.iter().zip(&mut self.change) {
+                let place = &self.places[k];
+                self.forces[k] = *change;
+                *change = change.map(|force| place.proximal * force);
+                change[0] = 0.0;
             }
-            cholesky_solve(&self.matrix, n, &mut self.change);
-            for (force, change) in self.forces.iter_mut().zip(&self.change) {
-                *force += change;
+            solve(&self.matrix, m, &mut self.change);
+            for (&k, change) in self.active.iter().zip(&self.change) {
+                add_scaled(&mut self.forces[k], 1.0, change);
             }
             self.update_velocities();
             let mut settled = true;
-            for (pressed, place) in self.pressed.iter_mut().zip(&self.places) {
+            for (k, (pressed, place)) in self.pressed.iter_mut().zip(&self.places).enumerate() {
                 let next = if *pressed {
-                    self.forces[place.normal] >= 0.0
+                    self.forces[k][0] >= 0.0
                 } else {
-                    place.is_soft() && place.a - place.s * self.velocities[place.normal] > 0.0
+                    place.s > 0.0 && place.a - place.s * self.velocities[k][0] > 0.0
                 };
                 settled &= next == *pressed;
                 *pressed = next;
             }
             if settled {
-                return self.places.iter().all(|place| {
-                    let radius = place.radius(&self.forces);
-                    length(&self.forces[place.tangential()]) <= radius
-                });
+                let mut contacts = self.places.iter().zip(&self.forces);
+                return contacts.all(|(place, forces)| length(&forces[1..]) <= place.radius(forces));
             }
         }
         false
     }
 
     fn update_velocities(&mut self) {
-        let n = self.count;
-        for (r, velocity) in self.velocities.iter_mut().enumerate() {
-            *velocity = self.free[r] + dot(&self.delassus[r * n..(r + 1) * n], &self.forces);
+        let n = self.places.len();
+        self.velocities.clone_from(&self.free);
+        for k in 0..n {
+            let row = &self.delassus[k * n + k..(k + 1) * n];
+            let (own, others) = self.velocities[k..].split_at_mut(1);
+            add_scaled(&mut own[0], 1.0, &products(row.iter().zip(&self.forces[k..])));
+            for (velocities, block) in others.iter_mut().zip(&row[1..]) {
+                add_transposed(velocities, block, &self.forces[k]);
+            }
         }
     }
 
-    /// Solves with slipping contacts, from the forces that sticking would take.
-    fn slip(&mut self) {
-        for place in &self.places {
-            self.forces[place.normal] = self.forces[place.normal].max(0.0);
-            let radius = place.radius(&self.forces);
-            into_ball(&mut self.forces[place.tangential()], radius);
+    /// Solves with slipping contacts: from where they were before, else from the forces that sticking would take.
+    fn slip(&mut self, law: &impl Fn(usize, f64) -> Response) {
+        std::mem::swap(&mut self.forces, &mut self.guess);
+        if self.newton(law) {
+            self.guess.clone_from(&self.forces);
+            return;
+        }
+        std::mem::swap(&mut self.forces, &mut self.guess);
+        for (place, forces) in self.places.iter().zip(&mut self.forces) {
+            forces[0] = forces[0].max(0.0);
+            let radius = place.radius(forces);
+            into_ball(&mut forces[1..], radius);
         }
         for (round, sweeps) in SWEEPS.into_iter().enumerate() {
             for _ in 0..sweeps {
@@ -294,20 +340,22 @@ impl Problem {
                 self.sweep();
             }
             // Where Newton's method fails, Gauss-Seidel goes on from where it was.
-            self.right.copy_from_slice(&self.forces);
-            if self.newton() {
+            self.guess.clone_from(&self.forces);
+            if self.newton(law) {
+                self.guess.clone_from(&self.forces);
                 return;
             }
-            self.forces.copy_from_slice(&self.right);
+            self.forces.clone_from(&self.guess);
         }
         self.update_velocities();
         self.counters.unconverged += 1;
     }
 
-    /// Newton's method. Returns `true` if it converged.
-    fn newton(&mut self) -> bool {
+    /// Newton's method, for the laws as well. Returns `true` if it converged.
+    fn newton(&mut self, law: &impl Fn(usize, f64) -> Response) -> bool {
         for _ in 0..NEWTON_STEPS {
             self.update_velocities();
+            self.linearize(law);
             if self.error() <= TOLERANCE {
                 return true;
             }
@@ -317,58 +365,72 @@ impl Problem {
             }
         }
         self.update_velocities();
+        self.linearize(law);
         self.error() <= TOLERANCE
     }
 
-    /// Returns the loss of energy, J, when impulses take all velocities away; `forces` are these impulses. `None` if there is
-    /// nothing to be solved. The matrix is meant without the half step, and every row for itself.
+    /// Returns the loss of energy, J, when tangential impulses take all tangential velocities away; `forces` are these impulses.
+    /// `None` if there is nothing to be solved. The matrix is meant without the half step.
     pub(super) fn project(&mut self) -> Option<f64> {
-        let n = self.count;
-        let trace: f64 = (0..n).map(|r| self.delassus[r * n + r]).sum();
-        self.matrix.copy_from_slice(&self.delassus);
-        for r in 0..n {
-            self.matrix[r * n + r] += PROXIMAL * trace / n as f64;
+        let m = self.places.len();
+        self.active.clear();
+        self.active.extend(0..m);
+        self.gather();
+        let (mut trace, mut rows) = (0.0, 0.0);
+        for (k, place) in self.places.iter().enumerate() {
+            let own = &self.delassus[k * m + k];
+            trace += (1..=place.tangents).map(|r| own[r][r]).sum::<f64>();
+            rows += place.tangents as f64;
         }
-        if n == 0 || !cholesky(&mut self.matrix, n) {
+        for x in 0..m {
+            for y in 0..m {
+                let block = &mut self.matrix[x * m + y];
+                block[0] = [0.0; 4];
+                block.iter_mut().for_each(|row| row[0] = 0.0);
+            }
+            let own = &mut self.matrix[x * m + x];
+            own[0][0] = 1.0;
+            for r in 1..=self.places[x].tangents {
+                own[r][r] += PROXIMAL * trace / rows;
+            }
+            self.places[x].fill(own);
+        }
+        if m == 0 || !factorize(&mut self.matrix, m) {
             return None;
         }
+        self.forces.fill([0.0; 4]);
         for _ in 0..2 {
-            for r in 0..n {
-                self.change[r] = -self.free[r] - dot(&self.delassus[r * n..(r + 1) * n], &self.forces);
+            self.update_velocities();
+            for (change, velocities) in self.change.iter_mut().zip(&self.velocities) {
+                *change = velocities.map(|velocity| -velocity);
+                change[0] = 0.0;
             }
-            cholesky_solve(&self.matrix, n, &mut self.change);
-            for (force, change) in self.forces.iter_mut().zip(&self.change) {
-                *force += change;
+            solve(&self.matrix, m, &mut self.change);
+            for (forces, change) in self.forces.iter_mut().zip(&self.change) {
+                add_scaled(forces, 1.0, change);
             }
         }
-        let mut lost_j = 0.0;
-        for r in 0..n {
-            let change = dot(&self.delassus[r * n..(r + 1) * n], &self.forces);
-            lost_j -= self.forces[r] * (self.free[r] + 0.5 * change);
-        }
-        Some(lost_j)
+        self.update_velocities();
+        let numbers = self
+            .forces
+            .iter()
+            .flatten()
+            .zip(self.free.iter().flatten().zip(self.velocities.iter().flatten()));
+        Some(-0.5 * numbers.map(|(force, (free, velocity))| force * (free + velocity)).sum::<f64>())
     }
 
     /// Largest residual of the forces (those of the natural map), relative to the largest force.
     fn error(&self) -> f64 {
         let (mut error, mut scale) = (0.0f64, 0.0f64);
-        for place in &self.places {
-            let force = self.forces[place.normal];
-            error = error.max((force - self.pressing(place).max(0.0)).abs());
-            scale = scale.max(force);
-            let rows = place.tangential();
-            if rows.is_empty() {
-                continue;
-            }
-            let step = self.step_size(place);
-            let mut target = [0.0; 3];
-            for (target, r) in target.iter_mut().zip(rows.clone()) {
-                *target = self.forces[r] - step * self.velocities[r];
-            }
-            let target = &mut target[..rows.len()];
-            into_ball(target, place.radius(&self.forces));
-            for (target, r) in target.iter().zip(rows) {
-                error = error.max((target - self.forces[r]).abs());
+        for (k, (place, forces)) in self.places.iter().zip(&self.forces).enumerate() {
+            error = error.max((forces[0] - self.pressing(k).max(0.0)).abs());
+            scale = scale.max(forces[0]);
+            if place.tangents > 0 {
+                let mut target = place.reach(forces, &self.velocities[k]);
+                into_ball(&mut target, place.radius(forces));
+                for (target, force) in target.iter().zip(&forces[1..]) {
+                    error = error.max((target - force).abs());
+                }
             }
         }
         if error > 0.0 {
@@ -381,122 +443,107 @@ impl Problem {
     }
 
     /// The normal force that the law asks of a contact, all others as they are, before it is cut at zero.
-    fn pressing(&self, place: &Place) -> f64 {
-        if !place.is_soft() {
+    fn pressing(&self, contact: usize) -> f64 {
+        let place = &self.places[contact];
+        if !(place.s > 0.0) {
             return 0.0;
         }
-        let own = self.delassus[place.normal * self.count + place.normal];
-        let others = self.velocities[place.normal] - own * self.forces[place.normal];
-        (place.a * place.softness() - others) / (own + place.softness())
-    }
-
-    /// The inverse of the mean tangential diagonal.
-    fn step_size(&self, place: &Place) -> f64 {
-        let sum: f64 = place.tangential().map(|r| self.delassus[r * self.count + r]).sum();
-        if sum > 0.0 { place.tangents as f64 / sum } else { 1.0 }
+        let own = self.delassus[contact * (self.places.len() + 1)][0][0];
+        let others = self.velocities[contact][0] - own * self.forces[contact][0];
+        (place.a - place.s * others) / (place.s * own + 1.0)
     }
 
     /// One step of the semismooth Newton method. Returns `false` if its matrix is singular.
     fn newton_step(&mut self) -> bool {
-        let n = self.count;
-        self.matrix.copy_from_slice(&self.delassus);
+        self.active.clear();
+        let mut opens = false;
         for k in 0..self.places.len() {
-            let place = self.places[k];
-            let (normal, rows) = (place.normal, place.tangential());
-            if !(self.pressing(&place) > 0.0) {
-                for r in normal..normal + 1 + place.tangents {
-                    self.matrix[r * n..(r + 1) * n].fill(0.0);
-                    self.matrix[r * n + r] = 1.0;
-                    self.change[r] = -self.forces[r];
-                }
-                continue;
+            if self.pressing(k) > 0.0 {
+                self.active.push(k);
+            } else if self.forces[k] != [0.0; 4] {
+                self.forces[k] = [0.0; 4];
+                opens = true;
             }
-            self.matrix[normal * n + normal] += place.softness();
-            self.change[normal] =
-                (place.a - self.forces[normal]) * place.softness() - self.velocities[normal];
-            if rows.is_empty() {
-                continue;
-            }
-            let (radius, step) = (place.radius(&self.forces), self.step_size(&place));
-            // The force that would stick, its length and direction.
-            let mut y = [0.0; 3];
-            for (y, r) in y.iter_mut().zip(rows.clone()) {
-                *y = self.forces[r] - step * self.velocities[r];
-            }
+        }
+        if opens {
+            self.update_velocities();
+        }
+        let m = self.active.len();
+        self.gather();
+        for (x, y) in (0..m).flat_map(|x| (0..x).map(move |y| (x, y))) {
+            self.matrix[x * m + y] = transposed(&self.matrix[y * m + x]);
+        }
+        for (x, &k) in self.active.iter().enumerate() {
+            let (place, forces, velocities) = (&self.places[k], &self.forces[k], &self.velocities[k]);
+            let row = &mut self.matrix[x * m..(x + 1) * m];
+            let change = &mut self.change[x];
+            *change = velocities.map(|velocity| -velocity);
+            change[0] += (place.a - forces[0]) * place.softness();
+            let (radius, y) = (place.radius(forces), place.reach(forces, velocities));
             let reach = length(&y);
-            if reach <= radius && radius > 0.0 {
-                for r in rows {
-                    self.matrix[r * n + r] += place.proximal;
-                    self.change[r] = -self.velocities[r];
-                }
+            if place.tangents == 0 || reach <= radius && radius > 0.0 {
+                place.soften(&mut row[x]);
                 continue;
             }
-            let direction = if reach > 0.0 { y.map(|y| y / reach) } else { [0.0; 3] };
+            let direction = if reach > 0.0 { y.map(|y| y / reach) } else { y };
             let share = if reach > 0.0 { radius / reach } else { 0.0 };
-            let mut force = [0.0; 3];
-            force[..rows.len()].copy_from_slice(&self.forces[rows.clone()]);
-            let mut inside = force;
+            let mut inside = [forces[1], forces[2], forces[3]];
             into_ball(&mut inside, radius);
             // (1 - M) dl + r M dc - direction mu dl_n = radius direction - l, with M = share 1 - inside direction^T / reach,
             // divided by r.
-            let blend: [[f64; 3]; 3] = std::array::from_fn(|i| {
-                std::array::from_fn(|j| {
-                    let unit = if i == j { share } else { 0.0 };
-                    unit - if reach > 0.0 { inside[i] * direction[j] / reach } else { 0.0 }
-                })
-            });
-            for (i, r) in rows.clone().enumerate() {
-                let row = r * n;
-                self.matrix[row..row + n].fill(0.0);
-                for (j, s) in rows.clone().enumerate() {
-                    let m = blend[i][j];
-                    for c in 0..n {
-                        self.matrix[row + c] += m * self.delassus[s * n + c];
-                    }
-                    self.matrix[row + s] += (if i == j { 1.0 } else { 0.0 } - m) / step;
+            let mut blend = ZERO;
+            blend[0][0] = 1.0;
+            let mut own = ZERO;
+            for i in 0..place.tangents {
+                for j in 0..place.tangents {
+                    let (unit, turn) = (
+                        f64::from(u8::from(i == j)),
+                        if reach > 0.0 { inside[i] * direction[j] / reach } else { 0.0 },
+                    );
+                    let m = share * unit - turn;
+                    blend[i + 1][j + 1] = m;
+                    own[i + 1][j + 1] = (unit - m) / place.step;
                 }
-                self.matrix[row + normal] -= direction[i] * place.friction / step;
-                self.change[r] = (radius * direction[i] - force[i]) / step;
+                own[i + 1][0] = -direction[i] * place.friction / place.step;
+                change[i + 1] = (radius * direction[i] - forces[i + 1]) / place.step;
+            }
+            own[0][0] = place.softness();
+            place.fill(&mut own);
+            for block in row.iter_mut() {
+                *block = product(&blend, block);
+            }
+            for (row, own) in row[x].iter_mut().zip(&own) {
+                add_scaled(row, 1.0, own);
             }
         }
-        if !eliminate(&mut self.matrix, n, &mut self.change) {
+        if !eliminate(&mut self.matrix, m, &mut self.change) {
             return false;
         }
-        for (force, change) in self.forces.iter_mut().zip(&self.change) {
-            *force += change;
+        for (&k, change) in self.active.iter().zip(&self.change) {
+            add_scaled(&mut self.forces[k], 1.0, change);
         }
         true
     }
 
     /// One sweep of block Gauss-Seidel: each contact is solved exactly, all others as they are.
     fn sweep(&mut self) {
-        for k in 0..self.places.len() {
-            let place = self.places[k];
-            let all = place.normal..place.normal + 1 + place.tangents;
-            if !place.is_soft() {
-                self.forces[all].fill(0.0);
-                continue;
-            }
-            let n = self.count;
-            // Velocities of its rows without its own forces.
-            let mut free = [0.0; 4];
-            let mut own = [[0.0; 4]; 4];
-            for (i, r) in all.clone().enumerate() {
-                let row = &self.delassus[r * n..(r + 1) * n];
-                free[i] = self.free[r]
-                    + dot(&row[..all.start], &self.forces[..all.start])
-                    + dot(&row[all.end..], &self.forces[all.end..]);
-                own[i][..all.len()].copy_from_slice(&row[all.clone()]);
-            }
-            // The proximal term draws to the forces before, so that nothing of it is left in the end.
-            for (i, r) in place.tangential().enumerate() {
-                own[i + 1][i + 1] += place.proximal;
-                free[i + 1] -= place.proximal * self.forces[r];
-            }
-            own[0][0] += place.softness();
-            free[0] -= place.a * place.softness();
-            let forces = one_contact(&own, &free, place.tangents, place.friction);
-            self.forces[all.clone()].copy_from_slice(&forces[..all.len()]);
+        for (k, place) in self.places.iter().enumerate() {
+            self.forces[k] = if place.s > 0.0 {
+                // Velocities of its rows without its own forces; the proximal term draws to the forces before, so that
+                // nothing of it is left in the end.
+                let before = std::mem::take(&mut self.forces[k]);
+                let mut free = self.free[k];
+                for (other, forces) in self.forces.iter().enumerate() {
+                    add_scaled(&mut free, 1.0, &times(&self.block(k, other), forces));
+                }
+                add_scaled(&mut free, -place.proximal, &[0.0, before[1], before[2], before[3]]);
+                free[0] -= place.a * place.softness();
+                let mut own = self.block(k, k);
+                place.soften(&mut own);
+                one_contact(&own, &free, place.tangents, place.friction)
+            } else {
+                [0.0; 4]
+            };
         }
     }
 }

@@ -4,15 +4,17 @@
 //! The normal points from the first body to the second. Slip is the difference of the velocities of the two bodies' material
 //! points at the contact: Eq. 10 on a face. All corners of an object on a table are taken on the table's own plane.
 
+use super::linear::Four;
 use super::material::Material;
+use super::rows::Rows;
 use super::stiffness::Materials;
 use super::world::{Friction, World};
 use crate::mass::Branches;
 use crate::model::PlantModel;
-use crate::vectors::Everything;
+use crate::vectors::OBJECT;
 use blindgrasp_body::dynamics::{Body, JointMatrix, JointVector, place_bodies};
 use blindgrasp_body::polyhedron::Convex;
-use blindgrasp_body::{FingertipModel, MAX_JOINTS, Posture};
+use blindgrasp_body::{FingertipModel, Hand, MAX_JOINTS, Posture};
 use blindgrasp_shared::hand::LinkPose;
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 
@@ -95,12 +97,12 @@ pub struct Touch {
 }
 
 impl Touch {
-    fn new(pair: Pair, point_m: Vector3<f64>, normal: Vector3<f64>) -> Self {
+    fn new(pair: Pair, depth_m: f64, point_m: Vector3<f64>, normal: Vector3<f64>) -> Self {
         let helper = if normal.x.abs() < 0.6 { Vector3::x() } else { Vector3::y() };
         let first = helper.cross(&normal).normalize();
         let tangents = [first, normal.cross(&first)];
         let (friction, material) = Default::default();
-        Self { pair, point_m, normal, tangents, depth_m: 0.0, friction, material }
+        Self { pair, point_m, normal, tangents, depth_m, friction, material }
     }
 
     /// The number of tangential rows: none without friction, a third one with torsion.
@@ -112,13 +114,27 @@ impl Touch {
         }
     }
 
-    /// The part of a velocity of the second body that a row feels.
-    pub(super) fn along(&self, part: usize, velocity_m_s: &Vector3<f64>) -> f64 {
-        match part {
-            0 => self.normal.dot(velocity_m_s),
-            1 | 2 => self.tangents[part - 1].dot(velocity_m_s),
-            _ => 0.0,
+    /// The vectors along which each row feels the velocity of the second body against the first, at the contact, and their
+    /// spin.
+    pub(super) fn along(&self) -> [[Vector3<f64>; 4]; 2] {
+        let [mut linear, mut angular] = [[Vector3::zeros(); 4]; 2];
+        match self.pair {
+            Pair::Torsion { .. } => angular[0] = self.normal,
+            _ => linear[0] = self.normal,
         }
+        let tangents = self.tangents();
+        if tangents > 0 {
+            [linear[1], linear[2]] = self.tangents;
+        }
+        if tangents > 2 {
+            angular[3] = self.normal * self.torsion_length_m();
+        }
+        [linear, angular]
+    }
+
+    /// A velocity of the second body as the rows feel it.
+    pub(super) fn feels(&self, velocity_m_s: &Vector3<f64>) -> Four {
+        self.along()[0].map(|linear| linear.dot(velocity_m_s))
     }
 
     /// The torsion of a fingertip against the object as the rolling contact has it, one way round.
@@ -199,12 +215,11 @@ impl Placed {
         let (centre_m, radius_m) = (self.posture.centres_m[finger], model.fingertips[finger].radius_m);
         let closest = shape.closest(&self.turned.tr_mul(&(centre_m - self.position_m)));
         let point_m = self.position_m + self.turned * closest.point_m;
-        let pair = Pair::FingertipObject { finger };
+        let (pair, depth_m) = (Pair::FingertipObject { finger }, radius_m - closest.distance_m);
         Touch {
-            depth_m: radius_m - closest.distance_m,
             friction: world.fingertip_friction[finger],
             material: materials.fingertips[finger],
-            ..Touch::new(pair, point_m, -(self.turned * closest.normal))
+            ..Touch::new(pair, depth_m, point_m, -(self.turned * closest.normal))
         }
     }
 
@@ -215,83 +230,84 @@ impl Placed {
         (shape, materials): (&Convex, &Materials),
         t_s: f64,
         within_m: f64,
-        mut see: impl FnMut(Touch),
+        mut see: impl FnMut(&Touch),
     ) {
-        let mut near = |depth_m: f64, touch: &dyn Fn() -> Touch| {
-            if depth_m > -within_m {
-                see(Touch { depth_m, ..touch() });
-            }
-        };
         let hand = &model.hand;
         for finger in 0..materials.fingertips.len() {
             let touch = self.fingertip_touch((model, world), (shape, materials), finger);
-            near(touch.depth_m, &|| touch);
+            if touch.depth_m > -within_m {
+                see(&touch);
+            }
         }
         for (t, table) in world.tables.iter().enumerate() {
             let origin_m = table.point_m.at(t_s);
+            let corner = Pair::ObjectTable { corner: 0, table: t };
+            // The same for all.
+            let under = Touch::new(corner, 0.0, origin_m, -table.normal);
             for (finger, material) in materials.fingertips.iter().enumerate() {
                 let centre_m = self.posture.centres_m[finger];
                 let height_m = table.normal.dot(&(centre_m - origin_m));
-                let pair = Pair::FingertipTable { finger, table: t };
-                near(model.fingertips[finger].radius_m - height_m, &|| Touch {
-                    friction: table.fingertip_friction,
-                    material: *material,
-                    ..Touch::new(pair, centre_m - table.normal * height_m, -table.normal)
-                });
+                let depth_m = model.fingertips[finger].radius_m - height_m;
+                if depth_m > -within_m {
+                    let (pair, friction) =
+                        (Pair::FingertipTable { finger, table: t }, table.fingertip_friction);
+                    let point_m = centre_m - table.normal * height_m;
+                    see(&Touch { pair, point_m, depth_m, friction, material: *material, ..under });
+                }
             }
             for (corner, vertex_m) in model.object.shape.vertices_m.iter().enumerate() {
                 let corner_m = self.position_m + self.turned * vertex_m;
                 let height_m = table.normal.dot(&(corner_m - origin_m));
-                let pair = Pair::ObjectTable { corner, table: t };
-                near(-height_m, &|| Touch {
-                    friction: Friction { sliding: table.object_friction, torsion_m: 0.0 },
-                    material: materials.corner,
-                    ..Touch::new(pair, corner_m - table.normal * height_m, -table.normal)
-                });
+                if height_m < within_m {
+                    let pair = Pair::ObjectTable { corner, table: t };
+                    let friction = Friction { sliding: table.object_friction, torsion_m: 0.0 };
+                    let (point_m, material) = (corner_m - table.normal * height_m, materials.corner);
+                    see(&Touch { pair, point_m, depth_m: -height_m, friction, material, ..under });
+                }
             }
         }
         for (joint, material) in materials.limits.iter().enumerate() {
             let (lower_rad, upper_rad) = hand.range_rad(joint);
             let angle_rad = self.angles_rad[joint];
             let is_upper = angle_rad > 0.5 * (lower_rad + upper_rad);
-            near(if is_upper { angle_rad - upper_rad } else { lower_rad - angle_rad }, &|| Touch {
-                material: *material,
-                ..Touch::new(Pair::JointLimit { joint, is_upper }, Vector3::zeros(), Vector3::z())
-            });
+            let depth_rad = if is_upper { angle_rad - upper_rad } else { lower_rad - angle_rad };
+            if depth_rad > -within_m {
+                let pair = Pair::JointLimit { joint, is_upper };
+                let touch = Touch::new(pair, depth_rad, Vector3::zeros(), Vector3::z());
+                see(&Touch { material: *material, ..touch });
+            }
         }
     }
 
-    /// Row `part` of a contact: 0 is the rate of its gap, 1 and 2 slip along its tangents, 3 its torsion.
-    pub(super) fn row(&self, model: &PlantModel, touch: &Touch, part: usize) -> Everything {
-        let mut row = Everything::ZERO;
-        let (first, second) = match touch.pair {
-            Pair::JointLimit { joint, is_upper } => {
-                row.joints[joint] = if is_upper { -1.0 } else { 1.0 };
-                return row;
-            }
+    /// Sets the rows of a contact.
+    pub(super) fn set_rows(&self, hand: &Hand, branches: &Branches, touch: &Touch, rows: &mut Rows) {
+        let [linear, angular] = touch.along();
+        let (finger, second) = match touch.pair {
             Pair::FingertipObject { finger } | Pair::Torsion { finger } => (Some(finger), 1.0),
             Pair::FingertipTable { finger, .. } => (Some(finger), 0.0),
             Pair::ObjectTable { .. } => (None, -1.0),
+            Pair::JointLimit { .. } => (None, 0.0),
         };
-        let (linear, angular) = match part {
-            0 if matches!(touch.pair, Pair::Torsion { .. }) => (Vector3::zeros(), Some(touch.normal)),
-            0 => (touch.normal, None),
-            1 | 2 => (touch.tangents[part - 1], None),
-            _ => (Vector3::zeros(), Some(touch.normal * touch.torsion_length_m())),
+        let joint = |k: usize| match (finger, touch.pair) {
+            (Some(finger), _) if hand.moves(k, finger) => {
+                let axis = self.links[k].axis();
+                let velocity = (touch.point_m - self.links[k].origin_m).cross(&axis);
+                std::array::from_fn(|r| linear[r].dot(&velocity) - angular[r].dot(&axis))
+            }
+            (None, Pair::JointLimit { joint, is_upper }) if joint == k => {
+                [if is_upper { -1.0 } else { 1.0 }, 0.0, 0.0, 0.0]
+            }
+            _ => [0.0; 4],
         };
-        if second != 0.0 {
-            let turning = angular.unwrap_or_else(|| (touch.point_m - self.position_m).cross(&linear));
-            let entries = linear.iter().chain(turning.iter());
-            for (entry, value) in row.object.iter_mut().zip(entries) {
-                *entry = second * value;
+        let lever_m = touch.point_m - self.position_m;
+        let mut object = [[0.0; 4]; OBJECT];
+        for r in 0..4 {
+            let turning = lever_m.cross(&linear[r]) + angular[r];
+            for k in 0..3 {
+                object[k][r] = second * linear[r][k];
+                object[3 + k][r] = second * turning[k];
             }
         }
-        for k in first.into_iter().flat_map(|finger| model.hand.joints_to(finger)) {
-            let axis = self.links[k].axis();
-            let lever_m = touch.point_m - self.links[k].origin_m;
-            row.joints[k] =
-                -angular.map_or_else(|| linear.dot(&axis.cross(&lever_m)), |angular| angular.dot(&axis));
-        }
-        row
+        rows.set(branches, touch.pair.finger(branches), joint, &object);
     }
 }

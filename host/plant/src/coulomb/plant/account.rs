@@ -1,6 +1,7 @@
 //! The account of a solved instant: contacts with their forces, and the powers that flow.
 
-use super::{Plant, respond, table_velocity};
+use super::Plant;
+use crate::coulomb::linear::{Four, dot};
 use crate::coulomb::solve::Problem;
 use crate::coulomb::touch::{Pair, Touch};
 use crate::friction::FrictionTorque;
@@ -31,6 +32,14 @@ pub struct Contact {
 }
 
 impl Contact {
+    /// Its forces as the solver has them.
+    pub(super) fn forces(&self) -> Four {
+        let [first, second] = self.tangential_n;
+        let has_torsion = self.touch.tangents() == 3;
+        let third = if has_torsion { self.torsion_nm / self.touch.torsion_length_m() } else { 0.0 };
+        [self.normal_n, first, second, third]
+    }
+
     /// Share of the limit of friction that is used: 1 where it slips; 0 where there is none.
     pub fn used(&self) -> f64 {
         let limit_n = self.touch.friction.sliding * self.normal_n;
@@ -40,11 +49,7 @@ impl Contact {
         if !self.sticks {
             return 1.0;
         }
-        let turning_n = match self.touch.tangents() {
-            3 => self.torsion_nm / self.touch.torsion_length_m(),
-            _ => 0.0,
-        };
-        let [x, z] = self.tangential_n;
+        let [_, x, z, turning_n] = self.forces();
         (Vector3::new(x, z, turning_n).norm() / limit_n).min(1.0)
     }
 
@@ -127,31 +132,19 @@ impl Plant {
             flows.joint_speeds_squared[k] = speed * speed;
         }
         let Problem { forces, velocities, .. } = &self.problem;
-        let mut r = 0;
-        for (k, touch) in self.touches.iter().enumerate() {
-            let rate = -velocities[r];
-            let law = respond(
-                touch,
-                self.rates_m_s[k],
-                rate,
-                (self.path_s(), tau),
-                (self.started, self.as_rolling),
-            );
-            let damped = (forces[r] - law.elastic_n) * rate;
+        for (k, (touch, (forces, velocities))) in
+            self.touches.iter().zip(forces.iter().zip(velocities)).enumerate()
+        {
+            let rate = -velocities[0];
+            let damped = (forces[0] - self.problem.elastic_n(k)) * rate;
             match touch.pair {
                 Pair::JointLimit { .. } => flows.friction += damped,
                 Pair::Torsion { .. } => flows.torsion += damped,
                 _ => flows.indentation += damped,
             }
-            let table_m_s = self.table_velocity_now(touch);
-            for part in 0..=touch.tangents() {
-                if part > 0 {
-                    flows.slip -= forces[r] * velocities[r];
-                }
-                // The table is the second body: what it takes from it is the negative of the force on it.
-                flows.tables -= forces[r] * touch.along(part, &table_m_s);
-                r += 1;
-            }
+            flows.slip -= dot(&[0.0, forces[1], forces[2], forces[3]], velocities);
+            // The table is the second body: what it takes from it is the negative of the force on it.
+            flows.tables -= dot(forces, &self.tables_m_s[k]);
         }
         let object = &solution.object;
         flows.pushes = dot6(&self.pushed, object);
@@ -161,38 +154,24 @@ impl Plant {
         flows
     }
 
-    fn table_velocity_now(&self, touch: &Touch) -> Vector3<f64> {
-        let (t_s, h) = (self.time_s(), self.substep_s);
-        table_velocity(&self.world, touch, (if self.started { t_s - h } else { t_s }, t_s + h))
-    }
-
     /// Makes the list of contacts with their forces.
     pub(super) fn report(&mut self) {
         let Self { touches, problem, contacts, .. } = self;
         contacts.clear();
-        let mut r = 0;
-        for (k, touch) in touches.iter().enumerate() {
-            let mut contact = Contact {
+        for (k, (touch, (forces, velocities))) in
+            touches.iter().zip(problem.forces.iter().zip(&problem.velocities)).enumerate()
+        {
+            let has_torsion = touch.tangents() == 3;
+            let torsion_m = if has_torsion { touch.torsion_length_m() } else { 1.0 };
+            contacts.push(Contact {
                 touch: *touch,
-                normal_n: problem.forces[r],
-                tangential_n: [0.0; 2],
-                torsion_nm: 0.0,
-                velocity_m_s: [problem.velocities[r], 0.0, 0.0],
-                torsion_rad_s: 0.0,
-                sticks: problem.sticking(k).is_some(),
-            };
-            for part in 1..=touch.tangents() {
-                let (force, velocity) = (problem.forces[r + part], problem.velocities[r + part]);
-                if part < 3 {
-                    contact.tangential_n[part - 1] = force;
-                    contact.velocity_m_s[part] = velocity;
-                } else {
-                    contact.torsion_nm = force * touch.torsion_length_m();
-                    contact.torsion_rad_s = velocity / touch.torsion_length_m();
-                }
-            }
-            contacts.push(contact);
-            r += 1 + touch.tangents();
+                normal_n: forces[0],
+                tangential_n: [forces[1], forces[2]],
+                torsion_nm: forces[3] * torsion_m,
+                velocity_m_s: [velocities[0], velocities[1], velocities[2]],
+                torsion_rad_s: velocities[3] / torsion_m,
+                sticks: problem.sticks(k),
+            });
         }
     }
 }

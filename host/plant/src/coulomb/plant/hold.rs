@@ -1,6 +1,8 @@
 //! The projection of velocities where contacts begin to stick.
 
-use super::{LEAST_PIVOT, Plant, delassus, table_velocity};
+use super::{LEAST_PIVOT, Plant, couple, room, table_velocity};
+use crate::coulomb::linear::{add_scaled, dot};
+use crate::coulomb::touch::Touch;
 use crate::mass::ObjectMass;
 use crate::rotation::{solve_inertia, turn_freely};
 use crate::vectors::{Everything, add, head, set_tail, tail};
@@ -29,50 +31,39 @@ impl Plant {
         let mut half = *before;
         set_tail(&mut half.object, &solve_inertia(&inertia_kg_m2, spin_momentum));
 
-        let Self { touches, fingers, whitened, mass, problem, projection, .. } = self;
+        let Self { touches, rows, mass, problem, projection, .. } = self;
         touches.clear();
         ahead.touches((model, world), (shape, materials), t_s + 0.5 * h, f64::INFINITY, |touch| {
             if stuck.contains(&touch.pair) {
-                touches.push(touch);
+                touches.push(*touch);
             }
         });
         let object = ObjectMass { mass_kg: model.object.mass_kg, inertia_kg_m2 };
         if !(mass.factorize(&ahead.mass, &[0.0; MAX_JOINTS], &object) > LEAST_PIVOT) {
             return;
         }
-        whitened.clear();
-        fingers.clear();
         projection.clear();
-        for touch in touches.iter() {
-            (0..touch.tangents()).for_each(|_| {
-                projection.add(0, 0.0);
-            });
+        let table_m_s = |touch: &Touch| touch.feels(&table_velocity(world, touch, (t_s, t_s + h)));
+        for (k, touch) in touches.iter().enumerate() {
+            let own = room(rows, k);
+            ahead.set_rows(&model.hand, &mass.branches, touch, own);
+            let mut free = own.times(&mass.branches, &half);
+            add_scaled(&mut free, 1.0, &table_m_s(touch));
+            projection.add(touch.tangents(), touch.friction.sliding, free, [0.0; 4]);
+            own.whiten(mass);
         }
-        projection.make_room();
-        for touch in touches.iter() {
-            let finger = touch.pair.finger(&mass.branches);
-            let table_m_s = table_velocity(world, touch, (t_s, t_s + h));
-            for part in 1..=touch.tangents() {
-                let (mut row, r) = (ahead.row(model, touch, part), whitened.len());
-                projection.velocities[r] = touch.along(part, &table_m_s);
-                projection.free[r] = mass.product(finger, &row, &half) + projection.velocities[r];
-                mass.whiten_branch(finger, &mut row);
-                whitened.push(row);
-                fingers.push(finger);
-            }
-        }
-        delassus(mass, fingers, whitened, 1.0, projection);
+        couple(rows, 1.0, projection);
         let Some(lost_j) = projection.project() else { return };
         problem.counters.projections += 1;
         let mut change = Everything::ZERO;
-        for (row, impulse) in whitened.iter().zip(&projection.forces) {
-            add(&mut change, *impulse, row);
+        for (rows, impulses) in rows.iter().zip(&projection.forces) {
+            rows.push(&mass.branches, impulses, &mut change);
         }
         mass.unwhiten(&mut change);
         add(before, 1.0, &change);
         *spin_momentum += inertia_kg_m2 * tail(&change.object);
         self.work.slip += lost_j;
-        let tables: f64 = projection.forces.iter().zip(&projection.velocities).map(|(l, v)| l * v).sum();
-        self.work.tables -= tables;
+        let tables = touches.iter().zip(&projection.forces).map(|(touch, l)| dot(l, &table_m_s(touch)));
+        self.work.tables -= tables.sum::<f64>();
     }
 }

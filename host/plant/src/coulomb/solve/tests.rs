@@ -12,60 +12,55 @@ type Laws = Vec<(f64, f64)>;
 fn random(numbers: &mut Numbers) -> (Problem, Laws) {
     let freedoms = 6 + 4 * numbers.below(4);
     let mut problem = Problem::default();
-    let (mut rows, mut laws) = (Vec::<Vec<f64>>::new(), vec![]);
+    let (mut rows, mut laws) = (Vec::<[Vec<f64>; 4]>::new(), vec![]);
+    let motion: Vec<f64> = (0..freedoms).map(|_| numbers.unit() - 0.5).collect();
+    let product = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+    let mut tangents = 0;
     for _ in 0..1 + numbers.below(12) {
-        let tangents = [0, 2, 3][numbers.below(3)];
+        let last = tangents;
+        tangents = [0, 2, 3][numbers.below(3)];
         let friction = if tangents == 0 { 0.0 } else { 0.05 + 1.5 * numbers.unit() };
-        let row = problem.add(tangents, friction);
-        let twin = row.checked_sub(1 + tangents).filter(|_| numbers.below(4) == 0);
-        for k in 0..1 + tangents {
-            rows.push(match twin {
-                Some(twin) => rows[twin + k].clone(),
-                None => (0..freedoms).map(|_| 2.0 * numbers.unit() - 1.0).collect(),
-            });
-        }
+        let twin = rows.last().filter(|_| last == tangents && numbers.below(2) == 0);
+        let own = twin.cloned().unwrap_or_else(|| {
+            std::array::from_fn(|part| {
+                let size = if part <= tangents { 2.0 } else { 0.0 };
+                (0..freedoms).map(|_| size * (numbers.unit() - 0.5)).collect()
+            })
+        });
+        problem.add(tangents, friction, std::array::from_fn(|k| product(&own[k], &motion)), [0.0; 4]);
+        rows.push(own);
         // Pressed with up to 3 N, or apart.
         laws.push((4.0 * numbers.unit() - 1.0, 0.2 + 5.0 * numbers.unit()));
     }
-    problem.make_room();
-    let n = rows.len();
-    let motion: Vec<f64> = (0..freedoms).map(|_| numbers.unit() - 0.5).collect();
-    for r in 0..n {
-        problem.free[r] = dot(&rows[r], &motion);
-        for s in 0..n {
-            problem.delassus[r * n + s] = 0.1 * dot(&rows[r], &rows[s]);
+    problem.couple(|i, j, block| {
+        for (a, b) in (0..16).map(|k| (k / 4, k % 4)) {
+            block[a][b] = 0.1 * product(&rows[i][a], &rows[j][b]);
         }
-    }
+    });
     (problem, laws)
 }
 
 impl Problem {
     /// Velocities by the plainest algorithm: a short step against the velocities, and back into the cone, again and again.
-    fn by_projected_steps(&self, laws: &Laws) -> Option<Vec<f64>> {
-        let n = self.count;
+    fn by_projected_steps(&self, laws: &Laws) -> Option<Vec<Four>> {
+        let n = self.places.len();
         let mut slow = self.clone();
-        slow.forces.fill(0.0);
+        slow.forces.fill([0.0; 4]);
         let stiffest = laws.iter().map(|(_, slope)| 1.0 / slope).fold(0.0, f64::max);
-        let step = 1.0 / ((0..n).map(|r| self.delassus[r * n + r]).sum::<f64>() + stiffest);
+        let trace = |k: usize| (0..4).map(|r| self.delassus[k * (n + 1)][r][r]).sum::<f64>();
+        let step = 1.0 / ((0..n).map(trace).sum::<f64>() + stiffest);
         for _ in 0..400_000 {
             slow.update_velocities();
             let mut change: f64 = 0.0;
-            for (place, (a, s)) in self.places.iter().zip(laws) {
-                let normal = place.normal;
-                let force = slow.forces[normal];
-                let next = (force - step * (slow.velocities[normal] + (force - a) / s)).max(0.0);
-                change = change.max((next - force).abs());
-                slow.forces[normal] = next;
-                let mut target = [0.0; 3];
-                for (target, r) in target.iter_mut().zip(place.tangential()) {
-                    *target = slow.forces[r] - step * slow.velocities[r];
-                }
-                let target = &mut target[..place.tangents];
-                into_ball(target, place.friction * next);
-                for (target, r) in target.iter().zip(place.tangential()) {
-                    change = change.max((target - slow.forces[r]).abs());
-                    slow.forces[r] = *target;
-                }
+            for (k, (place, (a, s))) in self.places.iter().zip(laws).enumerate() {
+                let (forces, velocities) = (slow.forces[k], slow.velocities[k]);
+                let normal = (forces[0] - step * (velocities[0] + (forces[0] - a) / s)).max(0.0);
+                let mut tangential: [f64; 3] =
+                    std::array::from_fn(|i| forces[i + 1] - step * velocities[i + 1]);
+                into_ball(&mut tangential, place.friction * normal);
+                slow.forces[k] = [normal, tangential[0], tangential[1], tangential[2]];
+                let changes = slow.forces[k].iter().zip(&forces).map(|(next, force)| (next - force).abs());
+                change = changes.fold(change, f64::max);
             }
             if change < 1e-13 {
                 slow.update_velocities();
@@ -78,15 +73,15 @@ impl Problem {
     /// The largest violation of each condition: cone, softened Signorini, maximum dissipation, complementarity of slip.
     fn residuals(&self, laws: &Laws) -> [f64; 4] {
         let mut worst = [0.0f64; 4];
-        for (place, (a, s)) in self.places.iter().zip(laws) {
-            let (normal, rows) = (place.normal, place.tangential());
-            let (force, slip) = (length(&self.forces[rows.clone()]), length(&self.velocities[rows.clone()]));
-            let radius = place.friction * self.forces[normal];
-            let power = dot(&self.forces[rows.clone()], &self.velocities[rows]);
-            let lawful = (a - s * self.velocities[normal]).max(0.0);
+        for (k, (place, (a, s))) in self.places.iter().zip(laws).enumerate() {
+            let (forces, velocities) = (&self.forces[k], &self.velocities[k]);
+            let (force, slip) = (length(&forces[1..]), length(&velocities[1..]));
+            let radius = place.friction * forces[0];
+            let power: f64 = forces[1..].iter().zip(&velocities[1..]).map(|(l, c)| l * c).sum();
+            let lawful = (a - s * velocities[0]).max(0.0);
             let here = [
-                (force - radius).max(0.0).max(-self.forces[normal]),
-                (self.forces[normal] - lawful).abs(),
+                (force - radius).max(0.0).max(-forces[0]),
+                (forces[0] - lawful).abs(),
                 (power + force * slip).abs(),
                 (radius - force).max(0.0) * slip,
             ];
@@ -114,11 +109,10 @@ fn two_hundred_random_states() {
         assert_eq!(problem.counters.unconverged, 0, "case {case}");
         let residuals = problem.residuals(&laws);
         worst = std::array::from_fn(|k| worst[k].max(residuals[k]));
-        for (k, place) in problem.places.iter().enumerate() {
-            let pressed = problem.forces[place.normal] > 0.0;
-            states[if !pressed {
+        for (k, forces) in problem.forces.iter().enumerate() {
+            states[if !(forces[0] > 0.0) {
                 0
-            } else if problem.sticking(k).is_some() {
+            } else if problem.sticks(k) {
                 1
             } else {
                 2
@@ -126,7 +120,8 @@ fn two_hundred_random_states() {
         }
         if let Some(slow) = slow {
             compared += 1;
-            off = slow.iter().zip(&problem.velocities).fold(off, |off, (a, b)| off.max((a - b).abs()));
+            let pairs = slow.iter().flatten().zip(problem.velocities.iter().flatten());
+            off = pairs.fold(off, |off, (a, b)| off.max((a - b).abs()));
         }
     }
     println!(
