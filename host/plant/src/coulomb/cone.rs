@@ -53,7 +53,8 @@ pub(super) fn one_contact(own: &[[f64; 4]; 4], free: &[f64; 4], tangents: usize,
             } else {
                 high = kappa
             }
-            if excess.abs() <= 1e-14 * friction * alpha || high - low <= 1e-15 * high {
+            let is_closed = high.is_finite() && high - low <= 1e-15 * high;
+            if excess.abs() <= 1e-14 * tangential.norm() || is_closed {
                 break;
             }
         }
