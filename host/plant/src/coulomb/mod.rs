@@ -2,8 +2,9 @@
 //! with Coulomb friction.
 //!
 //! Fingertips and corners are soft along the normal, so touch, lift-off and impact are smooth; only friction is not. The
-//! parts: `touch` finds contacts and makes their rows, `material` has normal forces (`stiffness` says which), `solve` finds the
-//! forces of one step (`cone` those of one contact), and [`Plant`] advances in time. [`World`] says what there is besides hand and object.
+//! parts: `touch` finds contacts, `rows` is what they feel, `material` has normal forces (`stiffness` says which), `solve` finds
+//! the forces of one step (`cone` those of one contact, with the matrices of `linear`), and [`Plant`] advances in time. [`World`]
+//! says what there is besides hand and object.
 
 mod cone;
 mod linear;

@@ -8,10 +8,10 @@
 //! - `|l_t| <= mu l_n`, and `c_t = 0` inside; on the boundary `c_t` is opposite to `l_t` (maximum dissipation).
 //!
 //! Normal forces are smooth enough for Newton's method, which linearizes them: `f = a + s d'`. What is left is tried first
-//! with every contact sticking; if all forces are in their cones, that is the answer. Else it is a semismooth Newton method
-//! (Alart and Curnier 1991, with the scaling of Hueeber, Stadler, Wohlmuth 2008) for friction and normal forces together, which
-//! begins at the forces of the step before. Where that fails, block Gauss-Seidel gets it started from the forces that sticking
-//! would take, and goes on as long as it fails.
+//! with every contact sticking; if all forces are in their cones, that is the answer. Else a semismooth Newton method (Alart
+//! and Curnier 1991, with the scaling of Hueeber, Stadler, Wohlmuth 2008) solves for friction and normal forces together,
+//! beginning at the forces of the step before. Where it fails, block Gauss-Seidel gets it started from the forces that sticking
+//! would take, for as long as it takes.
 //!
 //! Redundant rows are no error: a box on a table has eight tangential rows of rank three. A proximal term makes the matrix
 //! regular and shares the load out in proportion to the normal forces; one refinement takes its effect on the velocities
