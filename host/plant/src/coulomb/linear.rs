@@ -12,8 +12,8 @@ pub(super) type Block = [Four; 4];
 pub(super) const ZERO: Block = [[0.0; 4]; 4];
 
 /// Overwrites a symmetric positive definite matrix `A = U^T D U`: on the right of the diagonal with the blocks of `D U`, mirrored
-/// on its left with those of `U`, and on it with `U` and the inverse of `D`. Returns `false` if a pivot is not positive. Only
-/// blocks on the diagonal and on the right of it are read. A root for each pivot would take as long as all the rest.
+/// on its left with those of `U^T`, and on it with `U` and the inverse of `D`. Returns `false` if a pivot is not positive. Only
+/// blocks on the diagonal and on the right of it are read. There are no roots to wait for.
 pub(super) fn factorize(a: &mut [Block], n: usize) -> bool {
     for k in 0..n {
         let (above, rest) = a.split_at_mut((k + 1) * n);
@@ -30,13 +30,13 @@ pub(super) fn factorize(a: &mut [Block], n: usize) -> bool {
                 }
             }
             let row_i = &mut rest[i * n + k..];
-            row_i[0] = std::array::from_fn(|r| block[r].map(|entry| entry * pivot[r][r]));
+            row_i[0] = std::array::from_fn(|c| std::array::from_fn(|r| block[r][c] * pivot[r][r]));
         }
         for i in 0..right.len() {
             let row_i = &mut rest[i * n + k..(i + 1) * n];
             let (left, row_i) = row_i.split_at_mut(1);
             for (block, right_j) in row_i[i..].iter_mut().zip(&right[i..]) {
-                subtract_transposed(block, &left[0], right_j);
+                subtract(block, &left[0], right_j);
             }
         }
     }
@@ -58,18 +58,6 @@ fn factorize_block(a: &mut Block) -> bool {
         a[k][k] = inverse;
     }
     true
-}
-
-/// Subtracts `A^T B`. On its own, the compiler keeps the sums in registers.
-#[inline(never)]
-fn subtract_transposed(c: &mut Block, a: &Block, b: &Block) {
-    let mut sums = *c;
-    for k in 0..4 {
-        for i in 0..4 {
-            add_scaled(&mut sums[i], -a[k][i], &b[k]);
-        }
-    }
-    *c = sums;
 }
 
 /// Subtracts `A B`.
@@ -138,8 +126,9 @@ pub(super) fn solve(a: &[Block], n: usize, b: &mut [Four]) {
     for k in (0..n).rev() {
         let (above, below) = b.split_at_mut(k + 1);
         let x = &mut above[k];
-        let sum = products(below.iter().enumerate().map(|(i, y)| (&a[(k + 1 + i) * n + k], y)));
-        add_scaled(x, -1.0, &sum);
+        for (i, y) in below.iter().enumerate() {
+            add_transposed(x, &a[(k + 1 + i) * n + k], &y.map(|y| -y));
+        }
         let own = &a[k * n + k];
         for i in (0..4).rev() {
             for right in i + 1..4 {
