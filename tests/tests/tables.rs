@@ -134,3 +134,38 @@ fn a_hand_is_turned_over() {
     );
     assert!(told_m < 1e-3 && not_told_m > 0.01);
 }
+
+/// The ends of the joints' ranges and the rotors act where fingertips roll too, if the scene asks: without, the ideal cube swings
+/// far beyond them.
+///
+/// Tolerance: 5e-3 rad, by which the soft stops give; a rotor adds its kinetic energy at the same speeds.
+#[test]
+fn joints_stop_and_rotors_turn_where_a_scene_asks() {
+    let beyond_rad = |settings: &[&str]| {
+        let (scene, run) = run("cube-ideal", settings);
+        let beyond = |sample: &Sample| {
+            let each = sample.angles_rad.iter().enumerate().map(|(k, &angle)| {
+                let (lower, upper) = scene.hand.range_rad(k);
+                (angle - upper).max(lower - angle)
+            });
+            each.fold(0.0, f64::max)
+        };
+        run.samples.iter().map(beyond).fold(0.0, f64::max)
+    };
+    let free = beyond_rad(&["duration_s=12"]);
+    let stopped = beyond_rad(&["duration_s=12", "plant.joint_limits=true"]);
+    println!("beyond the joints' ranges by {free:.3} rad, with stops by {stopped:.4} rad");
+    assert!(free > 0.5 && stopped < 5e-3);
+
+    let kinetic_j = |setting: &str| {
+        let (scene, run) = run("cube-ideal", &["duration_s=0.05", setting]);
+        let last = run.samples.last().expect("samples");
+        let rotors = scene.rotors_kg_m2();
+        let of_rotors: f64 =
+            rotors.iter().zip(&last.speeds_rad_s).map(|(rotor, speed)| 0.5 * rotor * speed * speed).sum();
+        (last.energies.kinetic_j, of_rotors)
+    };
+    let ((_, none), (all, of_rotors)) = (kinetic_j("plant.rotors=false"), kinetic_j("plant.rotors=true"));
+    println!("{of_rotors:.2e} J of {all:.2e} J are the rotors'");
+    assert!(none == 0.0 && of_rotors > 0.2 * all && of_rotors < all);
+}
