@@ -14,6 +14,7 @@
 //! - [`noise`]: meshes of polyhedra with noise.
 //! - [`numeric`]: derivatives by differences, and the largest of many errors.
 //! - [`rolling`]: random states of a hand with its fingertips on an object, and what the plant makes of them.
+//! - [`shipped`]: the shipped scenes, loaded and run.
 //! - [`study`]: many objects, placed in the hand and grasped.
 //! - [`supervised`]: a simulated hand whose controller is watched, with things that go wrong.
 //! - [`thumb`]: what the functions of an image for the microcontroller call, and how much stack they take.
@@ -36,6 +37,7 @@ pub mod noise;
 pub mod numeric;
 pub mod random;
 pub mod rolling;
+pub mod shipped;
 pub mod study;
 pub mod supervised;
 pub mod thumb;

@@ -2,15 +2,10 @@
 //! scene, and what is missing is the integrator's error.
 
 use blindgrasp::model::Scene;
+use blindgrasp::sim::Simulation;
 use blindgrasp::sim::sample::{EnergySample, Sample};
-use blindgrasp::sim::{Run, Simulation};
 use blindgrasp_tests::numeric::order;
-
-fn run(scene: &str, settings: &[&str]) -> Run {
-    let settings: Vec<String> = settings.iter().map(|&setting| setting.to_owned()).collect();
-    let scene = Scene::load(scene, &settings).unwrap_or_else(|error| panic!("{error}"));
-    Simulation::new(&scene).expect("the scene can be simulated").run()
-}
+use blindgrasp_tests::shipped::{as_shipped, load, run};
 
 /// Returns the energy that is missing at a sample, J.
 fn missing_j(first: &EnergySample, now: &EnergySample) -> f64 {
@@ -37,11 +32,12 @@ fn exchanged_j(first: &EnergySample, now: &EnergySample) -> f64 {
 #[test]
 fn the_ledger_closes_in_every_built_in_scene() {
     for name in Scene::built_in() {
-        let samples = run(name, &[]).samples;
+        let run = as_shipped(name);
+        let samples = &run.samples;
         let (first, last) = (samples[0].energies, &samples[samples.len() - 1]);
         let exchanged =
             samples.iter().map(|sample| exchanged_j(&first, &sample.energies)).fold(0.0, f64::max);
-        let missing = most_missing_j(&samples);
+        let missing = most_missing_j(samples);
         println!(
             "{name}, {:.3} s: misses at most {missing:.1e} J of {exchanged:.1e} J exchanged ({:.1e}), {:.1e} J at the end",
             last.t_s,
@@ -70,8 +66,7 @@ fn what_the_ledger_misses_has_the_order_of_the_integrator() {
 #[test]
 fn dampers_and_friction_only_take() {
     for name in ["cube", "prism", "cube-ideal"] {
-        let settings = ["duration_s=1.5".to_owned()];
-        let scene = Scene::load(name, &settings).unwrap_or_else(|error| panic!("{error}"));
+        let scene = load(name, &["duration_s=1.5"]);
         let springs_j: f64 = scene
             .joints
             .iter()

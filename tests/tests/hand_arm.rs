@@ -1,10 +1,11 @@
 //! The paper's simulation (Sec. 5): do the shipped hand-arm and its object have the numbers of Tables I to III, do these fit
 //! together, and what comes of them?
 
-use blindgrasp::model::{HandFile, Scene};
+use blindgrasp::model::HandFile;
+use blindgrasp::sim::Run;
 use blindgrasp::sim::summary::Summary;
-use blindgrasp::sim::{Run, Simulation};
 use blindgrasp_tests::description::rodrigues;
+use blindgrasp_tests::shipped::{as_shipped, load, run};
 use nalgebra::{Matrix3, Vector3};
 use std::f64::consts::PI;
 
@@ -52,15 +53,6 @@ const FINGER_DAMPING: [&[f64]; 3] = [
 /// The places of the fingers, which the tables don't say: around the palm, rad, and from its axis, m.
 const AZIMUTHS_DEGREES: [f64; 3] = [-87.0, 153.0, 33.0];
 const PALM_RADIUS_M: f64 = 0.2556;
-
-fn load(name: &str, settings: &[&str]) -> Scene {
-    let settings: Vec<String> = settings.iter().map(|&setting| setting.to_owned()).collect();
-    Scene::load(name, &settings).unwrap_or_else(|error| panic!("{error}"))
-}
-
-fn run(name: &str, settings: &[&str]) -> Run {
-    Simulation::new(&load(name, settings)).expect("the scene can be simulated").run()
-}
 
 /// A frame that walks along a chain.
 #[derive(Clone, Copy)]
@@ -243,17 +235,17 @@ fn tell(run: &Run) {
 /// Energy falls all the time.
 #[test]
 fn with_the_printed_gains_it_is_held_for_long_but_not_for_ever() {
-    let run = run("hand-arm", &["duration_s=100"]);
-    tell(&run);
-    assert_eq!(run.summary.energy.increase_max_j, 0.0, "energy never rises");
-    let lost_at_s = run.summary.lost_at_s.expect("it is lost");
+    let long = run("hand-arm", &["duration_s=100"]);
+    tell(&long);
+    assert_eq!(long.summary.energy.increase_max_j, 0.0, "energy never rises");
+    let lost_at_s = long.summary.lost_at_s.expect("it is lost");
     // 74.999 s, whatever the step of the integrator; 70.2 s at 2 kHz.
     assert!((60.0..90.0).contains(&lost_at_s), "{lost_at_s} s");
-    let speeds = [2, 5, 10, 20].map(|t_s| fastest_joint_rad_s(&run, t_s));
+    let speeds = [2, 5, 10, 20].map(|t_s| fastest_joint_rad_s(&long, t_s));
     assert!(speeds.windows(2).all(|pair| pair[1] < pair[0]) && speeds[3] < 0.1, "{speeds:?}");
-    assert!(run.summary.settle_time_s.is_none());
+    assert!(long.summary.settle_time_s.is_none());
     // Fingers 1 and 3 are stretched out by then. Where their Jacobians degenerate, nothing makes the residuals of Eq. 38 vanish.
-    let (creeping, hand) = (&run.samples[40_000], HandFile::load("hand-arm").expect("it is built in"));
+    let (creeping, hand) = (&long.samples[40_000], HandFile::load("hand-arm").expect("it is built in"));
     let angle = |name: &str| {
         let joint = hand.joints.iter().position(|joint| joint.name == name).expect("it is there");
         creeping.angles_rad[joint]
@@ -263,7 +255,7 @@ fn with_the_printed_gains_it_is_held_for_long_but_not_for_ever() {
     // At rest, u_st would have to hold what the tangential part of the law's pull turns (Eqs. 53 and 54). What it has at the
     // most, in any attitude, is about half of that for fingers 2 and 3.
     let most_nm = 4.0 * load("hand-arm", &[]).control.attitude_stiffness_nm();
-    for contact in &run.samples[0].contacts[1..] {
+    for contact in &long.samples[0].contacts[1..] {
         let [lambda_x, lambda_z] = contact.lambda_n;
         let (x, z) = (lambda_x + contact.force_residual_n.x, lambda_z + contact.force_residual_n.z);
         let turning_nm = x.hypot(z) * (RADIUS_M - contact.indentation_m);
@@ -272,7 +264,7 @@ fn with_the_printed_gains_it_is_held_for_long_but_not_for_ever() {
     }
     // That torsional viscosity holds it so long: with a tenth of it, it is lost in less than a fifth of the time.
     let thinner = "hand.fingertip.*.torsional_damping_nm_s_rad_per_m2=1e3";
-    let lost_sooner_s = self::run("hand-arm", &["duration_s=20", thinner]).summary.lost_at_s;
+    let lost_sooner_s = run("hand-arm", &["duration_s=20", thinner]).summary.lost_at_s;
     println!("with a tenth of the torsional viscosity: lost at {lost_sooner_s:?} s");
     assert!(lost_sooner_s.is_some_and(|t_s| 5.0 * t_s < lost_at_s));
 }
@@ -299,7 +291,7 @@ fn half_the_step_gives_the_same_forces() {
 /// With a K_st that can hold the fingers it comes to rest, slowly, with the forces of Eq. 57.
 #[test]
 fn with_a_firmer_attitude_it_settles_with_the_forces_of_equation_57() {
-    let run = run("hand-arm-firm", &[]);
+    let run = as_shipped("hand-arm-firm");
     tell(&run);
     let summary = &run.summary;
     assert!(summary.grasp_held && summary.fault.is_none(), "{summary:?}");

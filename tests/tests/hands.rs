@@ -5,6 +5,7 @@ use blindgrasp::model::file::{Safety, SafetyKey};
 use blindgrasp::model::{HandFile, Scene};
 use blindgrasp::sim::{Run, Simulation};
 use blindgrasp_tests::generated;
+use blindgrasp_tests::shipped::{as_shipped, load};
 
 /// Scenes that are there to show how an object is lost.
 const LOST_ON_PURPOSE: [&str; 2] = ["cube-normal-only", "hand-arm-normal-only"];
@@ -12,11 +13,6 @@ const LOST_ON_PURPOSE: [&str; 2] = ["cube-normal-only", "hand-arm-normal-only"];
 /// the longest lever, if the difference were along the normal alone. What is off along the face and in the moments, it may be
 /// more along the normal.
 const FRICTION_SHARE: f64 = 2.0;
-
-fn load(name: &str, settings: &[&str]) -> Scene {
-    let settings: Vec<String> = settings.iter().map(|&setting| setting.to_owned()).collect();
-    Scene::load(name, &settings).unwrap_or_else(|error| panic!("{error}"))
-}
 
 fn run(scene: &Scene) -> Run {
     Simulation::new(scene).expect("the scene can be simulated").run()
@@ -49,7 +45,8 @@ fn every_hand_holds_an_object() {
     println!("| scene | hand | held for | at rest from | friction needed |");
     for name in Scene::built_in().filter(|name| !LOST_ON_PURPOSE.contains(name)) {
         let scene = load(name, &[]);
-        let summary = run(&scene).summary;
+        let run = as_shipped(name);
+        let summary = &run.summary;
         let at_rest = summary.settle_time_s.map_or("-".to_owned(), |t_s| format!("{t_s:.2} s"));
         let hand = &scene.file.hand.name;
         println!(
@@ -72,7 +69,7 @@ fn with_friction_every_hand_comes_to_rest_with_the_forces_of_equation_57() {
         if scene.sensors.ideal || scene.plant.has_friction() {
             continue;
         }
-        let run = run(&scene);
+        let run = as_shipped(name);
         let (summary, last) = (&run.summary, &run.summary.last);
         // The slowest is at rest from 1.22 s on, of which 0.3 s are the soft start.
         assert!(summary.settle_time_s.is_some_and(|t_s| t_s < 1.5), "{name}: {summary:?}");

@@ -1,14 +1,7 @@
 //! The results of a right implementation of the paper: the shipped scenes, run as `blindgrasp sim` runs them.
 
-use blindgrasp::model::Scene;
 use blindgrasp::sim::summary::Summary;
-use blindgrasp::sim::{Run, Simulation};
-
-fn run(scene: &str, settings: &[&str]) -> Run {
-    let settings: Vec<String> = settings.iter().map(|&setting| setting.to_owned()).collect();
-    let scene = Scene::load(scene, &settings).unwrap_or_else(|error| panic!("{error}"));
-    Simulation::new(&scene).expect("the scene can be simulated").run()
-}
+use blindgrasp_tests::shipped::{as_shipped, run};
 
 /// Largest relative difference of the normal forces from Eq. 57.
 fn normal_error(summary: &Summary) -> f64 {
@@ -39,12 +32,13 @@ fn tell(summary: &Summary) {
 #[test]
 fn prism_settles_with_the_forces_of_equation_57() {
     for (scene, ideal) in [("prism", false), ("prism-ideal", true)] {
-        let summary = run(scene, &[]).summary;
-        tell(&summary);
+        let run = as_shipped(scene);
+        let summary = &run.summary;
+        tell(summary);
         assert!(summary.grasp_held && summary.settle_time_s.is_some_and(|t_s| t_s < 3.0), "{summary:?}");
-        assert!(normal_error(&summary) < 0.01);
+        assert!(normal_error(summary) < 0.01);
         if ideal {
-            assert!(tangential_share(&summary) < 0.01);
+            assert!(tangential_share(summary) < 0.01);
             // At 1 kHz the hold feeds energy in: less than a thousandth of what there was.
             assert!(summary.energy.increase_max_j < 1e-3 * summary.energy.initial_j);
             // Eq. 57 is what k dr^2 comes to rest at, and residuals vanish (Eq. 52). 1e-3 N is what is left of the swing.
@@ -55,15 +49,16 @@ fn prism_settles_with_the_forces_of_equation_57() {
 
 #[test]
 fn cube_is_held_and_comes_to_rest() {
-    let summary = run("cube", &[]).summary;
-    tell(&summary);
+    let run = as_shipped("cube");
+    let summary = &run.summary;
+    tell(summary);
     assert!(summary.grasp_held && summary.settled);
     assert!(summary.fault.is_none());
 }
 
 #[test]
 fn ideal_cube_is_held_with_falling_energy() {
-    let run = run("cube-ideal", &[]);
+    let run = as_shipped("cube-ideal");
     tell(&run.summary);
     // Staying on its face is part of being held.
     assert!(run.summary.grasp_held && run.summary.duration_s >= 20.0);
@@ -79,7 +74,8 @@ fn ideal_cube_is_held_with_falling_energy() {
 
 #[test]
 fn cube_is_lost_by_normal_forces_alone() {
-    let summary = run("cube-normal-only", &[]).summary;
+    let run = as_shipped("cube-normal-only");
+    let summary = &run.summary;
     println!("{:?}: {:?}", summary.lost_at_s, summary.lost_reason);
     assert!(!summary.grasp_held && summary.lost_at_s.is_some_and(|t_s| t_s < 5.0), "{summary:?}");
 }
@@ -89,7 +85,8 @@ fn cube_is_lost_by_normal_forces_alone() {
 #[test]
 fn half_the_substep_changes_nothing() {
     for scene in ["prism-ideal", "prism", "cube", "cube-ideal"] {
-        let (whole, half) = (run(scene, &[]).summary, run(scene, &["plant.substep_s=5e-5"]).summary);
+        let whole = &as_shipped(scene).summary;
+        let half = &run(scene, &["plant.substep_s=5e-5"]).summary;
         match (whole.settle_time_s, half.settle_time_s) {
             (Some(whole), Some(half)) => {
                 assert!((half / whole - 1.0).abs() < 0.01, "{scene}: {whole} {half}")
@@ -101,7 +98,7 @@ fn half_the_substep_changes_nothing() {
                 let last = &summary.last;
                 [last.normal_force_n[finger], last.tangential_force_n[finger]]
             };
-            let ([normal, tangential], [half_normal, half_tangential]) = (force(&whole), force(&half));
+            let ([normal, tangential], [half_normal, half_tangential]) = (force(whole), force(half));
             let change = (half_normal - normal).abs().max((half_tangential - tangential).abs());
             assert!(change < 0.01 * normal.hypot(tangential), "{scene}, finger {finger}: {change} N");
         }

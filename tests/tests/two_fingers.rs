@@ -1,14 +1,6 @@
 //! Another hand: two opposed fingers of four joints hold a hexagonal prism.
 
-use blindgrasp::model::Scene;
-use blindgrasp::sim::Simulation;
-use blindgrasp::sim::summary::Summary;
-
-fn run(settings: &[&str]) -> Summary {
-    let settings: Vec<String> = settings.iter().map(|&setting| setting.to_owned()).collect();
-    let scene = Scene::load("two-finger-prism", &settings).unwrap_or_else(|error| panic!("{error}"));
-    Simulation::new(&scene).expect("the scene can be simulated").run().summary
-}
+use blindgrasp_tests::shipped::run;
 
 /// As shipped, turned, off the middle, and with the weight of the object.
 #[test]
@@ -19,7 +11,7 @@ fn two_fingers_hold_a_prism_and_come_to_rest() {
         &["pose.position_m.1=0.005"],
         &["plant.gravity_on_object=true"],
     ] {
-        let summary = run(settings);
+        let summary = run("two-finger-prism", settings).summary;
         println!("{settings:?}: at rest from {:?} s, {:?}", summary.settle_time_s, summary.last);
         assert!(summary.grasp_held && summary.fault.is_none(), "{summary:?}");
         assert!(summary.settle_time_s.is_some_and(|t_s| t_s < 1.0), "{summary:?}");
