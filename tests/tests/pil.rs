@@ -450,16 +450,14 @@ impl Expected {
 
 /// Damaged frames through a pipe to the receiver, with a good one after each: what is answered is every good one, what came
 /// through unharmed, and nothing else, in the order in which it was sent.
-#[test]
-fn a_million_damaged_frames_cost_those_and_no_other() {
-    const FRAMES: usize = 1_000_000;
+fn damaged_frames_cost_those_and_no_other(frames: usize) {
     /// Damaged frames that are sent before answers are looked at.
     const AT_ONCE: usize = 200;
     let mut host = greeted();
     let mut expected = Expected { session: host.session, ..Expected::default() };
     let mut stretches = Stretches::new(1_000_003);
     let (mut damaged, mut survived, mut bytes_sent, begun) = (0, 0, 0, Instant::now());
-    while damaged < FRAMES {
+    while damaged < frames {
         let mut bytes = Vec::new();
         for number in 0..AT_ONCE {
             let stretch = stretches.next_stretch();
@@ -510,6 +508,17 @@ fn a_million_damaged_frames_cost_those_and_no_other() {
         damaged as f64 / time_s,
         stretches.refused()
     );
+}
+
+#[test]
+fn a_hundred_thousand_damaged_frames_cost_those_and_no_other() {
+    damaged_frames_cost_those_and_no_other(100_000);
+}
+
+#[test]
+#[ignore = "the large form, for tests/run all"]
+fn at_large_a_million_damaged_frames_cost_those_and_no_other() {
+    damaged_frames_cost_those_and_no_other(1_000_000);
 }
 
 /// The instructions of the parts of a tick: within limits, the same in every run, and as written down.
