@@ -1,6 +1,7 @@
 //! The images for the microcontroller, built when they are asked for.
 
 use std::collections::BTreeMap;
+use std::env;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
@@ -39,15 +40,21 @@ pub fn image(kind: &str, hand: &str) -> PathBuf {
     PathBuf::from(executables.next_back().expect("cargo names what it built"))
 }
 
-/// The same as a file of its own, which stays as it is while the image is built for another hand.
+/// The same as a file of its own, which stays as it is while the image is built for another hand. `tests/run` names a folder
+/// that is empty when it begins (`BLINDGRASP_IMAGES`): there, an image is built by the first test that asks for it.
 pub fn kept_image(kind: &str, hand: &str) -> PathBuf {
     static KEPT: Mutex<BTreeMap<(String, String), PathBuf>> = Mutex::new(BTreeMap::new());
     // Building one after the other: cargo writes all hands to the same path.
     let mut kept = KEPT.lock().unwrap_or_else(PoisonError::into_inner);
     let path = kept.entry((kind.to_owned(), hand.to_owned())).or_insert_with(|| {
-        let built = image(kind, hand);
         let name = Path::new(hand).file_stem().expect("the hand is a file").to_string_lossy();
-        let copy = built.with_file_name(format!("{kind}-{name}.elf"));
+        let name = format!("{kind}-{name}.elf");
+        let folder = env::var_os("BLINDGRASP_IMAGES").map(PathBuf::from);
+        if let Some(there) = folder.as_ref().map(|folder| folder.join(&name)).filter(|path| path.exists()) {
+            return there;
+        }
+        let built = image(kind, hand);
+        let copy = folder.map_or_else(|| built.with_file_name(&name), |folder| folder.join(&name));
         fs::copy(&built, &copy).expect("the image can be copied");
         copy
     });
