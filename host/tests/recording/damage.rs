@@ -1,6 +1,6 @@
 //! Files that were cut or changed: no panic, bounded memory, no entry that was not recorded, and every loss told.
 
-use super::hand::{Hand, about, read, settings};
+use super::hand::{Written, about, read, settings};
 use super::{is_limited, run_limited};
 use blindgrasp::files::OutputError;
 use blindgrasp::record::mcap::{
@@ -10,26 +10,22 @@ use std::fs;
 use std::path::Path;
 use std::time::{Duration, Instant};
 
-const MS: u64 = 1_000_000;
 /// Copies that are changed.
 const COPIES: u64 = 10_000;
 
 /// A small recording with a checkpoint after each 40 ticks; returns how many bytes and entries each checkpoint saved.
 fn record(path: &Path, ticks: u64, finish: bool) -> Vec<(u64, usize)> {
-    let mut random = fastrand::Rng::with_seed(1);
-    let mut writer = Writer::create(path, true).unwrap();
-    let device = writer.add_device("hand");
+    let writer = Writer::create(path, true).unwrap();
     // Without the tail. It has its name when something is in it.
     let mut partial = path.to_owned().into_os_string();
     partial.push(".partial");
     let mut saved = vec![(fs::metadata(partial).unwrap().len() - 50, 0)];
-    writer.about(device, Stamp(0), &about("two-finger")).unwrap();
-    writer.parameters(device, Stamp(0), &settings("two-finger")).unwrap();
-    let mut hand = Hand::new(about("two-finger").joint_names.len());
+    let mut written = Written::of("two-finger", writer, 1);
+    written.writer.parameters(written.device, Stamp(0), &settings("two-finger")).unwrap();
     for tick in 1..=ticks {
-        let (_, payload) = hand.tick(&mut random);
-        writer.received(device, Stamp(tick * MS), &payload).unwrap();
+        written.tick().unwrap();
         if tick.is_multiple_of(40) {
+            let writer = &mut written.writer;
             writer.checkpoint().unwrap();
             let (entries, damage, _) = read(path);
             assert!(damage.is_none() && damage.unfinished, "{damage}");
@@ -38,10 +34,10 @@ fn record(path: &Path, ticks: u64, finish: bool) -> Vec<(u64, usize)> {
         }
     }
     if finish {
-        writer.finish().unwrap();
+        written.writer.finish().unwrap();
     } else {
         // As if it were killed: the file stays as the last checkpoint left it.
-        std::mem::forget(writer);
+        std::mem::forget(written.writer);
     }
     saved
 }
@@ -110,16 +106,11 @@ fn killed_while_it_writes_the_file_is_what_it_was() {
 /// is missing. What comes to a chunk and its write adds no record.
 #[test]
 fn at_any_tick_all_but_the_last_half_second_is_in_the_file() {
-    let mut random = fastrand::Rng::with_seed(9);
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.mcap");
-    let mut writer = Writer::create(&path, false).unwrap();
-    let device = writer.add_device("hand");
-    writer.about(device, Stamp(0), &about("three-finger")).unwrap();
-    let mut hand = Hand::new(12);
+    let mut written = Written::of("three-finger", Writer::create(&path, false).unwrap(), 9);
     for tick in 1..=3000_u64 {
-        let (_, payload) = hand.tick(&mut random);
-        writer.received(device, Stamp(tick * 1_000_000), &payload).unwrap();
+        written.tick().unwrap();
         // It has its name since the first write. Just before and after others, and anywhere between.
         if tick > 501 && (tick % 500 < 3 || tick % 83 == 0) {
             let (entries, damage, _) = read(&path);

@@ -1,6 +1,6 @@
 //! A disk without room.
 
-use super::hand::{Hand, about, read};
+use super::hand::{Written, read};
 use super::{is_limited, run_limited};
 use blindgrasp::record::mcap::{RecordingError, Stamp, What, Writer};
 use std::path::Path;
@@ -12,19 +12,11 @@ fn what_was_saved_is_told_and_can_be_read() {
         run_limited("trap '' XFSZ; ulimit -f 512", "full_disk::what_was_saved_is_told_and_can_be_read");
         return;
     }
-    let mut random = fastrand::Rng::with_seed(3);
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.mcap");
-    let mut writer = Writer::create(&path, false).unwrap();
-    let device = writer.add_device("hand");
-    writer.about(device, Stamp(0), &about("three-finger")).unwrap();
-    let mut hand = Hand::new(12);
-    let error = (1..100_000_u64)
-        .find_map(|tick| {
-            let (_, payload) = hand.tick(&mut random);
-            writer.received(device, Stamp(tick * 1_000_000), &payload).err()
-        })
-        .expect("the file may not grow for ever");
+    let mut written = Written::of("three-finger", Writer::create(&path, false).unwrap(), 3);
+    let error = (1..100_000).find_map(|_| written.tick().err()).expect("the file may not grow for ever");
+    let Written { mut writer, device, .. } = written;
     let RecordingError::Stopped { saved, .. } = &error else { panic!("{error}") };
     let saved = *saved;
     println!("{error}");

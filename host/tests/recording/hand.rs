@@ -2,7 +2,9 @@
 
 use blindgrasp::body::MAX_JOINTS;
 use blindgrasp::model::{HandFile, HandModel};
-use blindgrasp::record::mcap::{About, Entry, Record, Recording, Setting, What};
+use blindgrasp::record::mcap::{
+    About, Arrival, Device, Entry, Record, Recording, RecordingError, Setting, Stamp, What, Writer,
+};
 use blindgrasp_shared::command::{Answer, Command, Refusal};
 use blindgrasp_shared::control::PerGain;
 use blindgrasp_shared::event::{Event, Events};
@@ -111,6 +113,32 @@ impl Hand {
         }
         let payload = postcard::to_allocvec(&Reply::Record(sent.clone())).unwrap();
         (sent, payload)
+    }
+}
+
+/// A recording that is being written, of a hand that does what chance wants.
+pub(crate) struct Written {
+    pub(crate) writer: Writer,
+    pub(crate) device: Device,
+    pub(crate) ticks: u64,
+    hand: Hand,
+    random: fastrand::Rng,
+}
+
+impl Written {
+    /// It says who it is.
+    pub(crate) fn of(hand: &str, mut writer: Writer, seed: u64) -> Self {
+        let (about, device) = (about(hand), writer.add_device("hand"));
+        writer.about(device, Stamp(0), &about).unwrap();
+        let (hand, random) = (Hand::new(about.joint_names.len()), fastrand::Rng::with_seed(seed));
+        Self { writer, device, ticks: 0, hand, random }
+    }
+
+    /// The record of the next millisecond.
+    pub(crate) fn tick(&mut self) -> Result<Arrival, RecordingError> {
+        self.ticks += 1;
+        let (_, payload) = self.hand.tick(&mut self.random);
+        self.writer.received(self.device, Stamp(self.ticks * 1_000_000), &payload)
     }
 }
 

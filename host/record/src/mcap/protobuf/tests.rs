@@ -98,34 +98,14 @@ fn the_link_is_written_and_read_as_prost_does() {
         let [bytes, frames, damaged, records, missing, dropped, unusable, inputs] =
             std::array::from_fn(|_| number(&mut random));
         let decimation = number(&mut random) as u32;
-        let ours = LinkStatus {
-            seconds_s,
-            bytes,
-            frames,
-            damaged,
-            records,
-            missing,
-            dropped,
-            unusable,
-            rate_hz,
-            decimation,
-            share,
-            inputs,
-        };
-        let theirs = theirs::LinkStatus {
-            seconds_s,
-            bytes,
-            frames,
-            damaged,
-            records,
-            missing,
-            dropped,
-            unusable,
-            rate_hz,
-            decimation,
-            share,
-            inputs,
-        };
+        macro_rules! status {
+            ($($path:ident)::+) => {
+                $($path)::+ {
+                    seconds_s, bytes, frames, damaged, records, missing, dropped, unusable, rate_hz, decimation, share, inputs,
+                }
+            };
+        }
+        let (ours, theirs) = (status!(LinkStatus), status!(theirs::LinkStatus));
         let mut written = ours.write();
         assert_eq!(written, theirs.encode_to_vec(), "{ours:?}");
         let later = theirs::Later {
