@@ -10,9 +10,6 @@ use std::fs;
 use std::path::Path;
 use std::time::{Duration, Instant};
 
-/// Copies that are changed.
-const COPIES: u64 = 10_000;
-
 /// A small recording with a checkpoint after each 40 ticks; returns how many bytes and entries each checkpoint saved.
 fn record(path: &Path, ticks: u64, finish: bool) -> Vec<(u64, usize)> {
     let writer = Writer::create(path, true).unwrap();
@@ -42,8 +39,8 @@ fn record(path: &Path, ticks: u64, finish: bool) -> Vec<(u64, usize)> {
     saved
 }
 
-#[test]
-fn a_file_cut_anywhere_gives_every_checkpoint_before() {
+/// At every byte where something begins or ends, and every `step` bytes between.
+fn a_file_that_was_cut_gives_every_checkpoint_before(step: usize) {
     let folder = tempfile::tempdir().unwrap();
     let (path, cut) = (folder.path().join("whole.mcap"), folder.path().join("cut.mcap"));
     for finish in [true, false] {
@@ -51,9 +48,8 @@ fn a_file_cut_anywhere_gives_every_checkpoint_before() {
         let bytes = fs::read(&path).unwrap();
         let (all, _, _) = read(&path);
         for length in 0..bytes.len() {
-            // Every byte where something begins or ends, and every seventh of the rest.
             let near = saved.iter().any(|(bytes, _)| bytes.abs_diff(length as u64) < 60);
-            if !near && length % 7 != 0 {
+            if !near && length % step != 0 {
                 continue;
             }
             fs::write(&cut, &bytes[..length]).unwrap();
@@ -79,6 +75,17 @@ fn a_file_cut_anywhere_gives_every_checkpoint_before() {
             }
         }
     }
+}
+
+#[test]
+fn a_file_cut_anywhere_gives_every_checkpoint_before() {
+    a_file_that_was_cut_gives_every_checkpoint_before(41);
+}
+
+#[test]
+#[ignore = "the large form, for tests/run all"]
+fn at_large_a_file_cut_anywhere_gives_every_checkpoint_before() {
+    a_file_that_was_cut_gives_every_checkpoint_before(7);
 }
 
 #[test]
@@ -170,16 +177,30 @@ fn corrupt(bytes: &mut Vec<u8>, random: &mut fastrand::Rng) {
 }
 
 #[test]
-fn ten_thousand_damaged_copies_give_nothing_that_was_not_recorded() {
-    if !is_limited() {
-        // Address space, KiB: what a length claims is not taken.
-        let told = run_limited(
-            "ulimit -v 400000",
-            "damage::ten_thousand_damaged_copies_give_nothing_that_was_not_recorded",
-        );
-        print!("{told}");
-        return;
+fn two_thousand_damaged_copies_give_nothing_that_was_not_recorded() {
+    if is_limited() {
+        damaged_copies_give_nothing_that_was_not_recorded(2000);
+    } else {
+        limited("damage::two_thousand_damaged_copies_give_nothing_that_was_not_recorded");
     }
+}
+
+#[test]
+#[ignore = "the large form, for tests/run all"]
+fn at_large_ten_thousand_damaged_copies_give_nothing_that_was_not_recorded() {
+    if is_limited() {
+        damaged_copies_give_nothing_that_was_not_recorded(10_000);
+    } else {
+        limited("damage::at_large_ten_thousand_damaged_copies_give_nothing_that_was_not_recorded");
+    }
+}
+
+/// Runs a test where address space is short (KiB): what a length claims is not taken.
+fn limited(test: &str) {
+    print!("{}", run_limited("ulimit -v 400000", test));
+}
+
+fn damaged_copies_give_nothing_that_was_not_recorded(copies: u64) {
     let folder = tempfile::tempdir().unwrap();
     let (path, copy) = (folder.path().join("a.mcap"), folder.path().join("b.mcap"));
     record(&path, 240, true);
@@ -187,7 +208,7 @@ fn ten_thousand_damaged_copies_give_nothing_that_was_not_recorded() {
     let (all, _, _) = read(&path);
     let (mut refused, mut whole, mut exact, mut longest) = (0, 0, 0, Duration::ZERO);
     let mut saved_entries = 0;
-    for seed in 0..COPIES {
+    for seed in 0..copies {
         let mut random = fastrand::Rng::with_seed(seed);
         let mut damaged = bytes.clone();
         for _ in 0..random.usize(1..=3) {
@@ -231,14 +252,14 @@ fn ten_thousand_damaged_copies_give_nothing_that_was_not_recorded() {
         whole += usize::from(given == all.len());
         saved_entries += given;
     }
-    let share = saved_entries as f64 / (all.len() as u64 * COPIES) as f64;
+    let share = saved_entries as f64 / (all.len() as u64 * copies) as f64;
     println!(
-        "{COPIES} copies of {} bytes: {refused} refused, {whole} gave all, {exact} counted by the summary, \
+        "{copies} copies of {} bytes: {refused} refused, {whole} gave all, {exact} counted by the summary, \
         {:.0} % of all entries saved, longest {longest:?}",
         bytes.len(),
         100.0 * share,
     );
-    assert!(refused < COPIES as usize / 10 && exact > COPIES as usize / 10 && share > 0.5);
+    assert!(refused < copies as usize / 10 && exact > copies as usize / 10 && share > 0.5);
     assert!(longest < Duration::from_secs(5), "{longest:?}");
 }
 
