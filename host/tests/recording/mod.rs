@@ -19,7 +19,7 @@ fn run_limited(limits: &str, test: &str) -> String {
     let output = Command::new("sh")
         .args([
             "-c",
-            &format!("{limits}; exec \"$0\" --exact recording::{test} --nocapture --test-threads 1"),
+            &format!("{limits}; exec \"$0\" --exact recording::{test} --include-ignored --nocapture --test-threads 1"),
         ])
         .arg(program)
         .env("RECORDING_LIMITED", "1")
