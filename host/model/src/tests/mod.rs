@@ -20,7 +20,7 @@ fn parse(text: &str) -> Result<Scene, SceneError> {
     Scene::parse(text, "s.toml", Path::new(""), &[])
 }
 
-fn load(name: &str, settings: &[&str]) -> Result<Scene, SceneError> {
+pub(crate) fn load(name: &str, settings: &[&str]) -> Result<Scene, SceneError> {
     let settings: Vec<String> = settings.iter().map(|s| s.to_string()).collect();
     Scene::load(name, &settings)
 }

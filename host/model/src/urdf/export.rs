@@ -27,17 +27,17 @@ impl HandFile {
     }
 }
 
-struct Export<'a> {
-    hand: &'a HandFile,
+/// Names of a hand's links and fingertips in files of other tools.
+pub(crate) struct Names {
     /// Names of the joints' links, in the hand's order.
-    links: Vec<String>,
-    /// Names of the fingertips' links.
-    tips: Vec<String>,
-    text: String,
+    pub(crate) links: Vec<String>,
+    /// Names of the fingertips, in the hand's order.
+    pub(crate) tips: Vec<String>,
 }
 
-impl<'a> Export<'a> {
-    fn of(hand: &'a HandFile) -> Self {
+impl Names {
+    /// Of a hand.
+    pub(crate) fn of(hand: &HandFile) -> Self {
         // Names of links must differ from each other, and some readers want them to differ from those of joints.
         let mut taken: Vec<String> = hand.joints.iter().map(|joint| joint.name.clone()).collect();
         taken.push(BASE.into());
@@ -50,11 +50,66 @@ impl<'a> Export<'a> {
             name
         };
         Self {
-            hand,
             links: hand.joints.iter().map(|joint| unused(format!("{}-link", joint.name))).collect(),
             tips: hand.fingertips.iter().map(|tip| unused(format!("{}-tip", tip.name))).collect(),
-            text: String::new(),
         }
+    }
+}
+
+/// Lines, indented by how deep they are.
+#[derive(Default)]
+pub(crate) struct Lines {
+    text: String,
+}
+
+impl Lines {
+    /// Adds a line.
+    pub(crate) fn line(&mut self, depth: usize, text: impl AsRef<str>) {
+        let _ = writeln!(self.text, "{:width$}{}", "", text.as_ref(), width = 2 * depth);
+    }
+
+    /// All of them.
+    pub(crate) fn text(self) -> String {
+        self.text
+    }
+}
+
+/// A link without mass of its own has next to nothing, since other tools refuse what has none: mass, kg; and moments of inertia
+/// xx, yy, zz, xy, xz, yz, kg m^2.
+pub(crate) fn inertia(joint: &JointFile) -> (f64, [f64; 6]) {
+    or_next_to_nothing(joint.mass_kg, moments(&joint.inertia_kg_m2))
+}
+
+fn or_next_to_nothing(mass_kg: f64, moments: [f64; 6]) -> (f64, [f64; 6]) {
+    if mass_kg == 0.0 && moments.iter().all(|moment| *moment == 0.0) {
+        let (mass_kg, moment) = NEXT_TO_NOTHING;
+        (mass_kg, [moment, moment, moment, 0.0, 0.0, 0.0])
+    } else {
+        (mass_kg, moments)
+    }
+}
+
+/// The bones of a link: their ends, at the joints and fingertips that sit on it, and their radii, m.
+pub(crate) fn bones(hand: &HandFile, link: Option<&str>) -> Vec<(Vector3<f64>, f64)> {
+    let joints = hand.joints.iter().filter(|joint| joint.parent.as_deref() == link);
+    let tips = hand.fingertips.iter().filter(|tip| Some(tip.link.as_str()) == link);
+    let ends = joints.map(|joint| joint.offset_m).chain(tips.map(|tip| tip.offset_m));
+    let thickest = THINNER * hand.fingertips.iter().map(|tip| tip.radius_m).fold(f64::INFINITY, f64::min);
+    ends.map(Vector3::from)
+        .filter(|end| end.norm() >= SHORTEST_BONE_M)
+        .map(|end| (end, thickest.min(SLENDERNESS * end.norm())))
+        .collect()
+}
+
+struct Export<'a> {
+    hand: &'a HandFile,
+    names: Names,
+    lines: Lines,
+}
+
+impl<'a> Export<'a> {
+    fn of(hand: &'a HandFile) -> Self {
+        Self { hand, names: Names::of(hand), lines: Lines::default() }
     }
 
     fn write(mut self) -> String {
@@ -74,21 +129,21 @@ impl<'a> Export<'a> {
             self.fingertip(i, tip);
         }
         self.line(0, "</robot>".into());
-        self.text
+        self.lines.text()
     }
 
     fn line(&mut self, depth: usize, text: String) {
-        let _ = writeln!(self.text, "{:width$}{text}", "", width = 2 * depth);
+        self.lines.line(depth, text);
     }
 
     /// The link of a joint by the joint's name; the base without one.
     fn link_name(&self, joint: Option<&str>) -> String {
         let index = joint.and_then(|name| self.hand.joints.iter().position(|joint| joint.name == name));
-        escaped(index.map_or(BASE, |index| &self.links[index]))
+        escaped(index.map_or(BASE, |index| &self.names.links[index]))
     }
 
     fn base(&mut self) {
-        let bones = self.bones(None);
+        let bones = bones(self.hand, None);
         if bones.is_empty() {
             self.line(1, format!("<link name=\"{BASE}\"/>"));
         } else {
@@ -99,21 +154,15 @@ impl<'a> Export<'a> {
     }
 
     fn link(&mut self, k: usize, joint: &JointFile) {
-        self.line(1, format!("<link name=\"{}\">", escaped(&self.links[k])));
-        self.inertial(joint.mass_kg, &joint.mass_centre_m, &moments(&joint.inertia_kg_m2));
-        let bones = self.bones(Some(&joint.name));
+        self.line(1, format!("<link name=\"{}\">", escaped(&self.names.links[k])));
+        self.inertial(inertia(joint), &joint.mass_centre_m);
+        let bones = bones(self.hand, Some(&joint.name));
         self.visuals(&bones);
         self.line(1, "</link>".into());
     }
 
-    fn inertial(&mut self, mass_kg: f64, centre_m: &[f64; 3], moments: &[f64; 6]) {
-        let is_massless = mass_kg == 0.0 && moments.iter().all(|moment| *moment == 0.0);
-        let (mass_kg, [xx, yy, zz, xy, xz, yz]) = if is_massless {
-            let (mass_kg, moment) = NEXT_TO_NOTHING;
-            (mass_kg, [moment, moment, moment, 0.0, 0.0, 0.0])
-        } else {
-            (mass_kg, *moments)
-        };
+    fn inertial(&mut self, (mass_kg, moments): (f64, [f64; 6]), centre_m: &[f64; 3]) {
+        let [xx, yy, zz, xy, xz, yz] = moments;
         let inertia = format!(
             "<inertia ixx=\"{xx:?}\" ixy=\"{xy:?}\" ixz=\"{xz:?}\" iyy=\"{yy:?}\" iyz=\"{yz:?}\" izz=\"{zz:?}\"/>"
         );
@@ -128,7 +177,7 @@ impl<'a> Export<'a> {
         let [lower, upper] = joint.limits_rad;
         let lines = [
             format!("<parent link=\"{}\"/>", self.link_name(joint.parent.as_deref())),
-            format!("<child link=\"{}\"/>", escaped(&self.links[k])),
+            format!("<child link=\"{}\"/>", escaped(&self.names.links[k])),
             format!(
                 "<origin xyz=\"{}\" rpy=\"{}\"/>",
                 numbers(&joint.offset_m),
@@ -150,11 +199,11 @@ impl<'a> Export<'a> {
     }
 
     fn fingertip(&mut self, i: usize, tip: &FingertipFile) {
-        let name = escaped(&self.tips[i]);
+        let name = escaped(&self.names.tips[i]);
         let sphere = format!("<geometry><sphere radius=\"{:?}\"/></geometry>", tip.radius_m);
         let parent = self.link_name(Some(&tip.link));
         self.line(1, format!("<link name=\"{name}\">"));
-        self.inertial(0.0, &[0.0; 3], &[0.0; 6]);
+        self.inertial(or_next_to_nothing(0.0, [0.0; 6]), &[0.0; 3]);
         self.line(2, format!("<visual>{sphere}<material name=\"fingertip\"/></visual>"));
         self.line(2, format!("<collision>{sphere}</collision>"));
         self.line(1, "</link>".into());
@@ -165,20 +214,9 @@ impl<'a> Export<'a> {
         self.line(1, "</joint>".into());
     }
 
-    /// Returns the ends of the bones of a link: at the joints and fingertips that sit on it.
-    fn bones(&self, link: Option<&str>) -> Vec<Vector3<f64>> {
-        let joints = self.hand.joints.iter().filter(|joint| joint.parent.as_deref() == link);
-        let tips = self.hand.fingertips.iter().filter(|tip| Some(tip.link.as_str()) == link);
-        let ends = joints.map(|joint| joint.offset_m).chain(tips.map(|tip| tip.offset_m));
-        ends.map(Vector3::from).filter(|end| end.norm() >= SHORTEST_BONE_M).collect()
-    }
-
-    fn visuals(&mut self, bones: &[Vector3<f64>]) {
-        let radii = self.hand.fingertips.iter().map(|tip| tip.radius_m);
-        let thickest = THINNER * radii.fold(f64::INFINITY, f64::min);
-        for end in bones {
+    fn visuals(&mut self, bones: &[(Vector3<f64>, f64)]) {
+        for (end, radius) in bones {
             let length = end.norm();
-            let radius = thickest.min(SLENDERNESS * length);
             // The axis z of a cylinder, turned into the bone.
             let across = blindgrasp_shared::math::norm(&Vector3::new(end.x, end.y, 0.0));
             let rpy = [0.0, libm::atan2(across, end.z), libm::atan2(end.y, end.x)];
@@ -200,11 +238,12 @@ fn moments(inertia: &InertiaFile) -> [f64; 6] {
     std::array::from_fn(|k| inertia.0.get(k).copied().unwrap_or(0.0))
 }
 
-fn numbers(values: &[f64; 3]) -> String {
-    values.map(|value| format!("{value:?}")).join(" ")
+/// Numbers with all their bits, as an attribute's value.
+pub(crate) fn numbers(values: &[f64]) -> String {
+    values.iter().map(|value| format!("{value:?}")).collect::<Vec<_>>().join(" ")
 }
 
 /// A name as an attribute's value.
-fn escaped(name: &str) -> String {
+pub(crate) fn escaped(name: &str) -> String {
     name.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
 }

@@ -19,7 +19,7 @@ mod assembly;
 mod body;
 mod complete;
 mod expand;
-mod export;
+pub(crate) mod export;
 mod keys;
 mod reader;
 mod robot;
