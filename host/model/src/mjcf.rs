@@ -14,20 +14,24 @@ use super::urdf::export::{Lines, Names, bones, escaped, inertia, numbers};
 use super::{HandFile, Scene};
 use blindgrasp_body::dynamics::{Body, JointMatrix, mass_matrix, place_bodies};
 use blindgrasp_body::{ContactFriction, FingertipModel, Hand, MAX_JOINTS, equilibrium_indentations};
+use blindgrasp_shared::math::Real;
 use nalgebra::{DMatrix, DVector, UnitQuaternion, Vector3};
 use std::f64::consts::PI;
 
 /// Name of the object's body and geometry.
 const OBJECT: &str = "object";
+/// The most that the fastest vibration of the object turns on in a step, rad: MuJoCo's springs are explicit.
+const MOST_PHASE_RAD: f64 = 0.5;
 /// Name of the pose and posture at the start.
 const START: &str = "start";
 
 /// Least and most impedance of a fingertip's contact. The part of MuJoCo's force that does not come from spring and damper is in
-/// proportion to the impedance; the least is MuJoCo's own.
-const IMPEDANCE: (f64, f64) = (1e-4, 1e-2);
-/// Depth at which a fingertip settles, in units of the width over which its impedance rises as `2 x - x^2`: there the
-/// force is locally in proportion to the square of the depth, as Eq. 14 has it.
-const SETTLED: f64 = 2.0 / 3.0;
+/// proportion to the impedance.
+const IMPEDANCE: (f64, f64) = (2e-3, 1e-2);
+/// Depth at which a fingertip settles, in units of the width over which its impedance rises. With a least of a fifth of the most
+/// the force is there locally in proportion to the square of the depth, as Eq. 14 has it, and is within 8 % of it from a seventh
+/// of that depth to one and a half of it.
+const SETTLED: f64 = 0.5;
 /// Midpoint of the impedance's rise, the least that MuJoCo takes: the rise begins with its steepest slope.
 const MIDPOINT: f64 = 1e-4;
 /// Depth at which a fingertip settles where Eq. 57 has none, in units of its radius.
@@ -62,10 +66,12 @@ impl Scene {
                 "set it to \"coulomb\"",
             );
         }
+        let settled_m = settled_m(self);
         let text = Export {
             scene: self,
             names: Names::of(&self.file.hand),
-            settled_m: settled_m(self),
+            step_s: step_s(self, &settled_m),
+            settled_m,
             lines: Lines::default(),
         }
         .write();
@@ -118,6 +124,7 @@ struct Export<'a> {
     names: Names,
     /// Depths at which the fingertips settle, m.
     settled_m: Vec<f64>,
+    step_s: f64,
     lines: Lines,
 }
 
@@ -169,16 +176,16 @@ impl Export<'_> {
         self.line(0, "<?xml version=\"1.0\"?>");
         self.line(0, format!("<!-- Written by blindgrasp {version}."));
         for line in [
-            "     Fingertips press as they do in blindgrasp (k dr^2, Eq. 14), in force and in slope, where the grasp settles (Eq. 57);",
-            "     shallower they are softer, deeper they are linear. The geometry that touches is a core, with a margin as deep as",
-            "     the fingertip settles. solref and solimp of a core hold for these masses: MuJoCo makes stiffness of them with the",
-            "     inertia that it estimates at joint angles zero. What touches is what has a pair. -->",
+            "     Fingertips press as they do in blindgrasp (k dr^2, Eq. 14), in force and in slope, where the grasp settles (Eq. 57),",
+            "     within 8 % from a seventh of that depth to one and a half of it. The geometry that touches is a core, with a margin as",
+            "     deep as the fingertip settles. solref and solimp of a core hold for these masses: MuJoCo makes stiffness of them with",
+            "     the inertia that it estimates at joint angles zero. What touches is what has a pair. -->",
         ] {
             self.line(0, line);
         }
         self.line(0, format!("<mujoco model=\"{}\">", escaped(&scene.name)));
         self.line(1, "<compiler angle=\"radian\"/>");
-        let (step_s, gravity) = (scene.plant.substep_s, numbers(&scene.plant.gravity_m_s2));
+        let (step_s, gravity) = (self.step_s, numbers(&scene.plant.gravity_m_s2));
         self.line(
             1,
             format!(
@@ -327,10 +334,10 @@ impl Export<'_> {
             let (tip, name) = (&scene.fingertips[i], core_name(&escaped(&self.names.tips[i])));
             let yields_per_kg =
                 yields_per_kg(&scene.hand, &scene.rotors_kg_m2(), scene.hand.fingertip_link(i));
-            let soft = softness(tip, depth_m, yields_per_kg + 1.0 / scene.mass_kg, scene.plant.substep_s);
+            let soft = softness(tip, depth_m, yields_per_kg + 1.0 / scene.mass_kg, self.step_s);
             self.pair(&name, OBJECT, &scene.fingertip_friction[i], &soft);
             for (t, table) in scene.plant.tables.iter().enumerate() {
-                let soft = softness(tip, depth_m, yields_per_kg, scene.plant.substep_s);
+                let soft = softness(tip, depth_m, yields_per_kg, self.step_s);
                 let friction = ContactFriction { sliding: table.fingertip_friction, torsion_m: widest_m };
                 self.pair(&name, &table_name(t), &friction, &soft);
             }
@@ -374,6 +381,18 @@ fn settled_m(scene: &Scene) -> Vec<f64> {
     let force_n = scene.control.force_n();
     equilibrium_indentations(&scene.start.points_m, &inwards, &radii, &stiffnesses, force_n)
         .unwrap_or_else(|_| radii.iter().map(|radius_m| SOME_DEPTH * radius_m).collect())
+}
+
+/// Step, s: the longest that divides the plant's and resolves the object between its fingertips.
+fn step_s(scene: &Scene, settled_m: &[f64]) -> f64 {
+    let rotors = scene.rotors_kg_m2();
+    let squares = scene.fingertips.iter().zip(settled_m).enumerate().map(|(i, (tip, depth_m))| {
+        let yields_per_kg =
+            1.0 / scene.mass_kg + yields_per_kg(&scene.hand, &rotors, scene.hand.fingertip_link(i));
+        2.0 * tip.stiffness_n_m2 * depth_m * yields_per_kg
+    });
+    let fastest_rad_s = squares.sum::<f64>().square_root();
+    scene.substep_s / (scene.substep_s * fastest_rad_s / MOST_PHASE_RAD).ceil().max(1.0)
 }
 
 /// Acceleration of a link's centre of mass for each newton there, the mean over all directions, with all joints at zero, 1/kg:

@@ -143,6 +143,10 @@ fn fingertips_press_as_ours_where_they_settle() {
             assert!((force_n(depth_m, 0.0) / expected_n - 1.0).abs() < 1e-3);
             let slope = (force_n(1.001 * depth_m, 0.0) - force_n(0.999 * depth_m, 0.0)) / (0.002 * depth_m);
             assert!((slope / (2.0 * tip.stiffness_n_m2 * depth_m) - 1.0).abs() < 0.02, "{slope}");
+            for share in [1.0 / 7.0, 0.2, 0.3, 0.4, 0.6, 0.8, 1.2, 1.5] {
+                let ratio = force_n(share * depth_m, 0.0) / (share * share * expected_n);
+                assert!((ratio - 1.0).abs() < 0.08, "{share}: {ratio}");
+            }
             let damping = force_n(depth_m, 1.0) - force_n(depth_m, 0.0);
             let area_m2 = PI * (2.0 * tip.radius_m - depth_m) * depth_m;
             assert!((damping / (tip.damping_n_s_m3 * area_m2) - 1.0).abs() < 1e-3);
