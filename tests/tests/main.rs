@@ -16,6 +16,7 @@ mod integrator;
 mod keys;
 mod kinematics;
 mod ledger;
+mod mujoco;
 mod pinocchio;
 mod polyhedra;
 mod protocol;
