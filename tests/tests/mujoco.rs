@@ -4,6 +4,7 @@ use blindgrasp::model::Scene;
 use blindgrasp::sim::Simulation;
 use blindgrasp::sim::sample::Sample;
 use blindgrasp::sim::verdict::Outcome;
+use blindgrasp_shared::math::Real;
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 use serde::Deserialize;
 use serde_json::json;
@@ -164,10 +165,10 @@ fn ours(mass_kg: f64) -> (Outcome, f64) {
 fn limit_kg(mut good_kg: f64, mut bad_kg: f64, is_bad: impl Fn(Outcome) -> bool) -> f64 {
     assert!(!is_bad(ours(good_kg).0) && is_bad(ours(bad_kg).0));
     while bad_kg / good_kg > 1.005 {
-        let mass_kg = (good_kg * bad_kg).sqrt();
+        let mass_kg = (good_kg * bad_kg).square_root();
         *if is_bad(ours(mass_kg).0) { &mut bad_kg } else { &mut good_kg } = mass_kg;
     }
-    (good_kg * bad_kg).sqrt()
+    (good_kg * bad_kg).square_root()
 }
 
 /// 40 masses around the limit at which a fingertip slips by a millimetre, and around that at which the cube falls: the same end in both.

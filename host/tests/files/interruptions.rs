@@ -37,6 +37,7 @@ const COMMANDS: &[(&[&str], &[&str])] = &[
     (&["object", "new", "../part.stl", "--unit", "mm", "--mass-kg", "1", "--out", "out.toml"], &["out.toml"]),
     (&["object", "check", "cube", "--picture", "out.svg"], &["out.svg"]),
     (&["scene", "new", "three-finger", "cube", "--out", "out.toml"], &["out.toml"]),
+    (&["scene", "export", "cube-table", "--mjcf", "out.xml"], &["out.xml"]),
     (&["recording", "finish", "../run.mcap", "--out", "out.mcap"], &["out.mcap"]),
     (&["record", "--port", "../link", "--duration", "1", "--out", "out.mcap"], &["out.mcap"]),
     (&["console", "--port", "../link", "--out", "out.mcap"], &["out.mcap"]),

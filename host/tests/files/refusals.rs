@@ -30,7 +30,30 @@ const COMMANDS: &[(&str, &[&str])] = &[
     ("part.toml", &["object", "check", "part.toml", "--picture", "{}"]),
     ("hand.toml", &["scene", "new", "hand.toml", "cube", "--out", "{}", "--force"]),
     ("part.stl", &["scene", "new", "three-finger", "part.toml", "--out", "{}", "--force"]),
+    (
+        "scene.toml",
+        &["scene", "export", "scene.toml", "--set", "plant.contact=coulomb", "--mjcf", "{}", "--force"],
+    ),
 ];
+
+/// A scene that MuJoCo can't have, and a file that is there.
+#[test]
+fn an_export_that_is_refused_changes_nothing() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    let output = run(folder, &["scene", "export", "cube", "--mjcf", "out.xml"]);
+    assert_eq!(output.status.code(), Some(2));
+    assert!(told(&output).contains("plant.contact: is \"rolling\""), "{}", told(&output));
+    assert!(names(folder).is_empty());
+    fs::write(folder.join("out.xml"), "before").unwrap();
+    let output = run(folder, &["scene", "export", "cube-table", "--mjcf", "out.xml"]);
+    assert_eq!(output.status.code(), Some(2));
+    assert_eq!(fs::read_to_string(folder.join("out.xml")).unwrap(), "before");
+    let output = run(folder, &["scene", "export", "cube-table", "--mjcf", "out.xml", "--force"]);
+    assert_eq!(output.status.code(), Some(0), "{}", told(&output));
+    assert!(told(&output).contains("not in MJCF: plant.table.1.move"), "{}", told(&output));
+    assert!(fs::read_to_string(folder.join("out.xml")).unwrap().contains("<mujoco model=\"cube-table\">"));
+}
 
 #[test]
 fn nothing_is_written_over_what_is_read_by_whatever_name() {
