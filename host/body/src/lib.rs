@@ -8,7 +8,7 @@ mod parts;
 pub mod polyhedron;
 
 pub use equilibrium::equilibrium_indentations;
-pub use parts::{ContactFriction, FaceContact, FingertipModel, JointFriction, Push};
+pub use parts::{CORNER_STIFFNESS_N_M, ContactFriction, FaceContact, FingertipModel, JointFriction, Push};
 
 /// The largest hand that the host loads: joints.
 pub const MAX_JOINTS: usize = 24;

@@ -27,6 +27,9 @@ pub struct FaceContact {
     pub distance_m: f64,
 }
 
+/// Stiffness of a corner of the object on a table, N/m: that of hard plastic on wood.
+pub const CORNER_STIFFNESS_N_M: f64 = 6e4;
+
 /// Friction of a contact.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ContactFriction {

@@ -52,6 +52,7 @@ pub(super) fn scene(file: SceneFile) -> Result<Scene> {
         return fail(item("hand.joint", k, "mass_kg"), problem, "give its link a mass and an inertia");
     }
     world::at_start(&file, &hand, &object.shape, &start)?;
+    world::sinking(&file.plant, object.mass_kg, &mut warnings);
     overlaps(&file.hand, &hand, &start.angles_rad, &mut warnings);
 
     Ok(Scene {

@@ -4,7 +4,7 @@ use super::check::{Result, all_within, fail, item, within};
 use super::file::{PlantSettings, SceneFile};
 use super::{Scene, Start, hand::posture};
 use blindgrasp_body::polyhedron::{Convex, Polyhedron};
-use blindgrasp_body::{ContactFriction, Hand};
+use blindgrasp_body::{CORNER_STIFFNESS_N_M, ContactFriction, Hand};
 use nalgebra::Vector3;
 
 /// Coefficient of friction where no file gives one: that of rubber on a smooth box.
@@ -16,6 +16,10 @@ const TORSIONAL_FRICTION_M: f64 = 2e-3;
 const MOST_FRICTION: f64 = 100.0;
 /// Depth to which the object may lie in a table at the start, m: more than its weight alone presses it in.
 const SUNK_M: f64 = 1e-4;
+/// Corners that an object may lie on.
+const CORNERS: f64 = 4.0;
+/// Depth from which on an object that sinks into a table is told, m.
+const SINKS_M: f64 = 1e-3;
 /// The most of a table's own length unit that its normal may be off by.
 const OFF_UNIT: f64 = 1e-3;
 
@@ -136,6 +140,18 @@ pub(super) fn at_start(file: &SceneFile, hand: &Hand, shape: &Polyhedron, start:
         }
     }
     Ok(())
+}
+
+/// Tells an object that is too heavy for the softness of tables.
+pub(super) fn sinking(plant: &PlantSettings, mass_kg: f64, warnings: &mut Vec<String>) {
+    let weight_n = mass_kg * Vector3::from(plant.gravity_m_s2).norm();
+    let sunk_m = weight_n / (CORNERS * CORNER_STIFFNESS_N_M);
+    if !plant.tables.is_empty() && sunk_m > SINKS_M {
+        warnings.push(format!(
+            "plant.table: the object of {mass_kg} kg sinks in by {:.1} mm or more: a table gives way under each corner by 1 mm for 60 N",
+            sunk_m * 1e3
+        ));
+    }
 }
 
 impl Scene {

@@ -92,6 +92,19 @@ fn shipped_scenes_touch_and_have_no_warnings_but_known_ones() {
     assert!(models.iter().all(|&count| count >= 3), "{models:?}");
 }
 
+/// A table gives way; what is too heavy for it is told.
+#[test]
+fn an_object_that_sinks_into_the_table_is_told() {
+    let warnings = |mass: &str| load("cube-table", &[mass]).unwrap().warnings;
+    assert_eq!(warnings("object.mass_kg=20"), Vec::<String>::new());
+    assert_eq!(
+        warnings("object.mass_kg=100"),
+        [
+            "plant.table: the object of 100 kg sinks in by 4.1 mm or more: a table gives way under each corner by 1 mm for 60 N"
+        ]
+    );
+}
+
 #[test]
 fn shipped_objects_are_those_of_table_vi() {
     let prism = load("prism", &[]).unwrap();

@@ -4,12 +4,10 @@ use super::material::Material;
 use crate::mass::MassFactor;
 use crate::model::PlantModel;
 use crate::vectors::{Everything, dot};
-use blindgrasp_body::MAX_JOINTS;
+use blindgrasp_body::{CORNER_STIFFNESS_N_M, MAX_JOINTS};
 use blindgrasp_shared::math::Real;
 use nalgebra::Vector3;
 
-/// Stiffness of a corner of the object on a table, N/m: that of hard plastic on wood.
-const CORNER_N_M: f64 = 6e4;
 /// Stiffness of the end of a joint's range, N m/rad.
 const LIMIT_NM: f64 = 20.0;
 /// Damping of both, of critical.
@@ -47,7 +45,7 @@ pub(super) fn corner(model: &PlantModel, step_s: f64) -> Material {
         1.0 / object.mass_kg + (lever * inverse * lever.transpose()).trace()
     };
     let most = object.shape.vertices_m.iter().map(yields).fold(0.0, f64::max);
-    let stiffness_n_m = CORNER_N_M.min(1.0 / (corners * step_s * step_s * most));
+    let stiffness_n_m = CORNER_STIFFNESS_N_M.min(1.0 / (corners * step_s * step_s * most));
     let critical_n_s_m = 2.0 * (stiffness_n_m * object.mass_kg / corners).square_root();
     Material::spring(stiffness_n_m, DAMPING * critical_n_s_m)
 }
