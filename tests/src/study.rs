@@ -94,7 +94,7 @@ impl Study {
     /// and of the contacts: with `u_st`, without, and with the earlier law in its place, whose integral has this gain, N m/rad.
     ///
     /// # Errors
-    /// Why it is not placed.
+    /// The reason for which it is not placed.
     pub fn on_a_table(&self, object: &ObjectFile, integral_nm_rad: f64) -> Result<[Summary; 3], String> {
         let mut all = self.hand.place(object.clone(), 1).map_err(|none| none.to_string())?;
         let Placement { scene, quality } = all.swap_remove(0);

@@ -150,7 +150,7 @@ fn loaded(mass_kg: f64, settings: &[&str]) -> Scene {
     scene(&[&LOAD[..], &[&mass], settings].concat())
 }
 
-/// How a load ends in our plant, with joints that stick rigidly, and the farthest that a fingertip slips, mm.
+/// The end of a load in our plant, with joints that stick rigidly, and the farthest that a fingertip slips, mm.
 fn ours(mass_kg: f64) -> (Outcome, f64) {
     let mut simulation = Simulation::new(&loaded(mass_kg, &RIGID)).expect("a plant");
     while let Ok(Some(_)) = simulation.step() {}

@@ -31,9 +31,9 @@ pub struct Sample {
     pub spin_rad_s: Vector3<f64>,
     /// One for each finger.
     pub contacts: Vec<ContactSample>,
-    /// What tables carry.
+    /// Contacts of the object and of fingertips with tables, those that carry something.
     pub on_tables: Vec<TableContact>,
-    /// Where they are: a point of each, m, and its normal.
+    /// The tables: a point of each, m, and its normal.
     pub tables: Vec<[Vector3<f64>; 2]>,
     /// Energy of Eq. 40 with its constants added, J.
     pub energy_j: f64,

@@ -233,7 +233,7 @@ fn the_true_state_of_the_world_is_recorded_to_the_bit() {
     }
 }
 
-/// What only contacts with friction have: how much of it is used, the way slipped, and what tables carry.
+/// Channels of contacts with friction alone: how much of it is used, the way slipped, and what tables carry.
 #[test]
 fn friction_and_tables_are_recorded_to_the_bit() {
     let folder = tempfile::tempdir().unwrap();

@@ -154,7 +154,7 @@ fn fingertips_press_as_ours_where_they_settle() {
     }
 }
 
-/// What a link yields to a force, from the kinetic energy of a hand of one joint: a point mass on a rod.
+/// Yield of a link to a force against that from the kinetic energy of a hand of one joint: a point mass on a rod.
 #[test]
 fn a_link_yields_as_its_inertia_says() {
     let scene = load("cube-table", &[]).unwrap();

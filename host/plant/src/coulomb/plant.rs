@@ -68,7 +68,7 @@ pub struct Plant {
     /// inverse factor of the mass matrix.
     touches: Vec<Touch>,
     rows: Vec<Rows>,
-    /// What contacts felt of the bodies' velocities half a step ago; the rates of their depths then; and about now, with
+    /// Velocities of the bodies at the contacts half a step ago; the rates of their depths then; and about now, with
     /// velocities extrapolated.
     felt: Vec<Four>,
     rates_m_s: Vec<f64>,

@@ -6,7 +6,7 @@ use crate::mass::{Branches, MassFactor};
 use crate::vectors::{Everything, OBJECT};
 use blindgrasp_body::MAX_CHAIN;
 
-/// What rows can act on.
+/// Number of velocities that the rows of a contact act on at most.
 const MOST: usize = MAX_CHAIN + OBJECT + MAX_CHAIN;
 
 /// The rows of a contact, by what they act on: the joints of the trunk, the object, and the joints of one finger at most.

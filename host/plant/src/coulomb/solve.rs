@@ -117,7 +117,7 @@ pub(super) struct Problem {
     pub(super) forces: Vec<Four>,
     /// Velocities with these forces.
     pub(super) velocities: Vec<Four>,
-    /// Where slip is looked for first.
+    /// The forces at which the search for slip begins.
     guess: Vec<Four>,
     pressed: Vec<bool>,
     /// The contacts that are solved for together, their matrix and right-hand sides.

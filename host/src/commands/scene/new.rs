@@ -127,7 +127,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
     Ok(if summary.grasp_held { Outcome::Shown } else { Outcome::Failed })
 }
 
-/// What a simulation came to.
+/// Returns the outcome of a simulation in words.
 fn in_words(summary: &Summary) -> String {
     let world = if summary.last.slipped_m.is_empty() {
         "in the paper's world"

@@ -88,7 +88,7 @@ pub struct World<'a> {
     pub torques_nm: &'a [f64],
     /// The contact of each finger, with the force on the object.
     pub contacts: &'a [Contact],
-    /// What tables carry, with their forces.
+    /// The contacts with tables, with the tables' forces.
     pub on_tables: &'a [Contact],
 }
 
