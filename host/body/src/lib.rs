@@ -1,12 +1,14 @@
-//! Rigid bodies and what they are made of: the hand with its [`dynamics`] and [`inverse_kinematics`], [`polyhedron`], fingertips
-//! and joints. Nothing moves here: that is the plant's.
+//! Rigid bodies and what they are made of: the hand with its [`dynamics`] and [`inverse_kinematics`], [`polyhedron`], fingertips,
+//! capsules and joints. Nothing moves here: that is the plant's.
 
+mod capsule;
 pub mod dynamics;
 mod equilibrium;
 pub mod inverse_kinematics;
 mod parts;
 pub mod polyhedron;
 
+pub use capsule::{Capsule, Part, closest_of_lines, pairs};
 pub use equilibrium::equilibrium_indentations;
 pub use parts::{CORNER_STIFFNESS_N_M, ContactFriction, FaceContact, FingertipModel, JointFriction, Push};
 
