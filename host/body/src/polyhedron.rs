@@ -10,6 +10,7 @@
 
 mod clearance;
 mod convex;
+mod critical;
 mod error;
 mod face;
 mod hull;
@@ -23,12 +24,15 @@ mod solids;
 pub mod surface;
 #[cfg(test)]
 mod tests;
+mod touchable;
 
 pub use clearance::Obstacles;
-pub use convex::{Closest, Convex};
+pub use convex::Closest;
+pub use critical::Critical;
 pub use error::counted;
 pub use error::{MeshFault, PolyhedronError};
 pub use mesh::{MAX_TRIANGLES, bounds_m, diagonal_m};
+pub use touchable::Touchable;
 
 use blindgrasp_shared::math::norm;
 use nalgebra::{Matrix3, Vector3};

@@ -10,7 +10,7 @@ const FLAT: f64 = 1e-6;
 
 /// A convex polyhedron, prepared to be asked often.
 #[derive(Clone, Debug)]
-pub struct Convex {
+pub(super) struct Convex {
     sides: Vec<Side>,
 }
 
@@ -44,7 +44,7 @@ pub struct Closest {
 
 impl Convex {
     /// Of a polyhedron; `None` if it is not convex.
-    pub fn of(shape: &Polyhedron) -> Option<Self> {
+    pub(super) fn of(shape: &Polyhedron) -> Option<Self> {
         let flat_m = FLAT * shape.radius_m();
         let is_inside = |point_m: &Vector3<f64>| {
             shape.faces.iter().all(|face| face.normal.dot(point_m) - face.distance_m <= flat_m)
@@ -66,7 +66,7 @@ impl Convex {
     }
 
     /// Returns the point of the surface that is closest to a point.
-    pub fn closest(&self, point_m: &Vector3<f64>) -> Closest {
+    pub(super) fn closest(&self, point_m: &Vector3<f64>) -> Closest {
         let height_m = |side: &Side| side.normal.dot(point_m) - side.distance_m;
         let mut highest = Closest { point_m: *point_m, normal: Vector3::z(), distance_m: f64::NEG_INFINITY };
         let mut edges: &[Edge] = &[];

@@ -1,0 +1,245 @@
+use super::super::Flatness;
+use super::*;
+use crate::polyhedron::clearance::nearest;
+use blindgrasp_meshes::{Mesh, Numbers, bracket, plate};
+
+fn body((vertices, triangles): &Mesh) -> Polyhedron {
+    let flatness = Flatness { angle_rad: 1e-6, distance_m: 1e-9 };
+    Polyhedron::mesh(vertices, triangles, &flatness).unwrap()
+}
+
+/// An octahedron of 30 mm with the top pushed in: a pit, whose bottom is a vertex with concave edges only.
+fn pit() -> Mesh {
+    let side = |x: f64, y: f64| Vector3::new(0.03 * x, 0.03 * y, 0.0);
+    let vertices = vec![
+        side(1.0, 0.0),
+        side(0.0, 1.0),
+        side(-1.0, 0.0),
+        side(0.0, -1.0),
+        Vector3::new(0.0, 0.0, -0.03),
+        Vector3::new(0.002, 0.003, -0.01),
+    ];
+    let around = [[0, 1], [1, 2], [2, 3], [3, 0]];
+    let triangles = around.iter().flat_map(|&[a, b]| [[b, a, 4], [a, b, 5]]).collect();
+    (vertices, triangles)
+}
+
+/// Two bars, one across the other and half sunk into it, askew: saddles at vertices, edges of every kind.
+fn step() -> Mesh {
+    let (mut vertices, triangles) = bracket();
+    for vertex in &mut vertices {
+        // Shears: nothing is at right angles.
+        vertex.x += 0.3 * vertex.y + 0.2 * vertex.z;
+        vertex.z += 0.1 * vertex.x;
+    }
+    (vertices, triangles)
+}
+
+/// A roof whose ridge is concave, by ten degrees.
+fn valley() -> Mesh {
+    let (w, d, h) = (0.03, 0.02, 0.03 * 0.0875);
+    let at = |x: f64, y: f64, z: f64| Vector3::new(x, y, z);
+    let vertices = vec![
+        at(-w, -d, 0.0),
+        at(w, -d, 0.0),
+        at(w, -d, 0.02 + h),
+        at(0.0, -d, 0.02),
+        at(-w, -d, 0.02 + h),
+        at(-w, d, 0.0),
+        at(w, d, 0.0),
+        at(w, d, 0.02 + h),
+        at(0.0, d, 0.02),
+        at(-w, d, 0.02 + h),
+    ];
+    let front = [[0, 1, 3], [1, 2, 3], [0, 3, 4]];
+    let mut triangles: Vec<[usize; 3]> = front.to_vec();
+    triangles.extend(front.map(|[a, b, c]| [a + 5, c + 5, b + 5]));
+    for k in 0..5 {
+        let next = (k + 1) % 5;
+        triangles.extend([[next, k, k + 5], [next, k + 5, next + 5]]);
+    }
+    (vertices, triangles)
+}
+
+fn bodies() -> Vec<(Polyhedron, i32)> {
+    // With their Euler characteristics: the plate has a tunnel.
+    [(bracket(), 1), (plate(), 0), (pit(), 1), (step(), 1), (valley(), 1)]
+        .iter()
+        .map(|(mesh, euler)| (body(mesh), *euler))
+        .collect()
+}
+
+/// The square of the depth of a sphere, and its slopes: the energy of a soft one but for a factor.
+fn energy(surface: &Touchable, centre_m: &Vector3<f64>, radius_m: f64) -> (f64, Vector3<f64>) {
+    let mut places = Vec::new();
+    surface.touches(centre_m, radius_m, &mut places);
+    places.iter().fold((0.0, Vector3::zeros()), |(energy, slope), critical| {
+        let depth_m = radius_m - critical.place.distance_m;
+        let index = f64::from(critical.index);
+        (energy + index * depth_m * depth_m, slope - critical.place.normal * (2.0 * index * depth_m))
+    })
+}
+
+/// Against the nearest of all triangles, and the side by the solid angle that the surface fills.
+///
+/// Tolerance: coordinates of 0.1 m, a hundred roundings.
+#[test]
+fn the_closest_point_is_the_nearest_of_all_triangles() {
+    let mut numbers = Numbers(5);
+    for (shape, _) in bodies() {
+        let surface = Touchable::of(&shape);
+        assert!(!surface.is_convex());
+        let triangles: Vec<_> = shape
+            .faces
+            .iter()
+            .flat_map(|face| &face.triangles)
+            .map(|corners| corners.map(|k| shape.vertices_m[k]))
+            .collect();
+        let mut inside = 0;
+        for _ in 0..2000 {
+            let point = numbers.vector() * 0.05;
+            let closest = surface.closest(&point);
+            let least = triangles
+                .iter()
+                .map(|corners| norm(&(nearest(corners, &point) - point)))
+                .fold(f64::INFINITY, f64::min);
+            // Van Oosterom and Strackee.
+            let angle: f64 = triangles
+                .iter()
+                .map(|corners| {
+                    let [a, b, c] = corners.map(|corner| corner - point);
+                    let (x, y, z) = (norm(&a), norm(&b), norm(&c));
+                    2.0 * libm::atan2(
+                        a.dot(&b.cross(&c)),
+                        x * y * z + a.dot(&b) * z + b.dot(&c) * x + c.dot(&a) * y,
+                    )
+                })
+                .sum();
+            let sign = if angle > 6.0 { -1.0 } else { 1.0 };
+            inside += usize::from(sign < 0.0);
+            assert!((closest.distance_m - sign * least).abs() < 1e-15, "{closest:?} {least} {angle}");
+            let there = closest.point_m + closest.normal * closest.distance_m;
+            assert!((there - point).norm() < 1e-15 && (closest.normal.norm() - 1.0).abs() < 1e-12);
+        }
+        assert!(inside > 10, "{inside}");
+    }
+}
+
+/// Morse: the indices of all critical points add up to the body's Euler characteristic, seen from anywhere outside.
+#[test]
+fn all_indices_add_up_to_the_euler_characteristic() {
+    let mut numbers = Numbers(6);
+    for (shape, euler) in bodies() {
+        let surface = Touchable::of(&shape);
+        let (mut places, mut kinds) = (Vec::new(), [0; 3]);
+        for _ in 0..5000 {
+            let point = numbers.vector() * 0.06;
+            if surface.closest(&point).distance_m <= 0.0 {
+                continue;
+            }
+            surface.touches(&point, f64::INFINITY, &mut places);
+            assert_eq!(
+                places.iter().map(|critical| critical.index).sum::<i32>(),
+                euler,
+                "{point} {places:?}"
+            );
+            for critical in &places {
+                kinds[if critical.index < 0 { 0 } else { 1 }] += 1;
+                kinds[2] += usize::from(critical.index != 1);
+            }
+        }
+        assert!(kinds[0] > 50 && kinds[1] > 4000, "{kinds:?}");
+    }
+}
+
+/// An L cut into two boxes: both, less the rectangle that they share. A thin plate stands for that one; halving its thickness
+/// halves
+#[test]
+fn it_is_the_sum_over_convex_parts_less_what_they_share() {
+    let shape = body(&bracket());
+    let surface = Touchable::of(&shape);
+    let origin = shape.vertices_m.iter().fold(Vector3::repeat(f64::INFINITY), |least, v| least.inf(v));
+    let cuboid = |from: [f64; 3], to: [f64; 3]| {
+        let (from, to) = (Vector3::from(from), Vector3::from(to));
+        (Touchable::of(&Polyhedron::cuboid((to - from).into()).unwrap()), origin + (from + to) / 2.0)
+    };
+    let parts = [
+        (1.0, cuboid([0.0, 0.0, 0.0], [0.06, 0.02, 0.03])),
+        (1.0, cuboid([0.0, 0.02, 0.0], [0.02, 0.04, 0.03])),
+        (-1.0, cuboid([0.0, 0.02 - 5e-10, 0.0], [0.02, 0.02 + 5e-10, 0.03])),
+    ];
+    let mut numbers = Numbers(7);
+    let mut touching = 0;
+    for _ in 0..20_000 {
+        let centre = numbers.vector() * 0.05;
+        if surface.closest(&centre).distance_m <= 1e-3 {
+            continue;
+        }
+        let (got, slope) = energy(&surface, &centre, 0.02);
+        let mut expected = (0.0, Vector3::zeros());
+        for (sign, (part, middle)) in &parts {
+            let (energy, slope) = energy(part, &(centre - middle), 0.02);
+            expected.0 += sign * energy;
+            expected.1 += slope * *sign;
+        }
+        touching += usize::from(got > 0.0);
+        assert!(
+            (got - expected.0).abs() < 1e-10 && (slope - expected.1).norm() < 2e-8,
+            "{centre} {got} {expected:?}"
+        );
+    }
+    assert!(touching > 1000, "{touching}");
+}
+
+/// The energy is a potential: on a walk around every body it changes by what its slopes say, to second order in the step, also
+/// where places come and go; and forces don't jump.
+#[test]
+fn its_slopes_are_those_of_a_potential_everywhere() {
+    let mut numbers = Numbers(8);
+    for (shape, _) in bodies() {
+        let surface = Touchable::of(&shape);
+        let mut changes = 0;
+        for _ in 0..4000 {
+            let from = numbers.vector() * 0.05;
+            let step = numbers.vector() * 1e-5;
+            let to = from + step;
+            if surface.closest(&from).distance_m <= 2e-3 || surface.closest(&to).distance_m <= 2e-3 {
+                continue;
+            }
+            let radius_m = 0.015;
+            let ((before, slope), (after, slope_after)) =
+                (energy(&surface, &from, radius_m), energy(&surface, &to, radius_m));
+            let change = 0.5 * (slope + slope_after).dot(&step);
+            changes += usize::from(change != 0.0);
+            // Second derivatives: 2 for each place along the line to it, and 2 depth / distance across, at most 15; some ten places.
+            let bound = 150.0 * step.norm();
+            assert!((slope - slope_after).norm() < bound, "{from} {slope} {slope_after}");
+            assert!(
+                (after - before - change).abs() < bound * step.norm(),
+                "{from} {before} {after} {change}"
+            );
+        }
+        assert!(changes > 500, "{changes}");
+    }
+}
+
+/// Against many points of the line.
+#[test]
+fn no_point_of_a_line_is_closer() {
+    let mut numbers = Numbers(9);
+    let cube = Polyhedron::cuboid([0.04, 0.05, 0.06]).unwrap();
+    for shape in [cube, body(&bracket()), body(&plate())] {
+        let surface = Touchable::of(&shape);
+        for _ in 0..500 {
+            let ends = [numbers.vector() * 0.08, numbers.vector() * 0.08];
+            let (share, closest) = surface.closest_to_line(&ends);
+            let at = |share: f64| ends[0] + (ends[1] - ends[0]) * share;
+            assert!((surface.closest(&at(share)).distance_m - closest.distance_m).abs() < 1e-15);
+            let looks = (0..=1000).map(|k| surface.closest(&at(f64::from(k) / 1000.0)).distance_m);
+            let least = looks.fold(f64::INFINITY, f64::min);
+            // A body that is not convex may have two parts that are equally close to within a sixteenth of the line.
+            let slack = if surface.is_convex() { 1e-12 } else { norm(&(ends[1] - ends[0])) / 32.0 };
+            assert!(closest.distance_m <= least + slack, "{ends:?} {closest:?} {least}");
+        }
+    }
+}
