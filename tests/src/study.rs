@@ -101,7 +101,7 @@ impl Study {
         let SceneFile { object, pose, contacts, .. } = scene.file;
         let real = SceneFile { object, pose, contacts, ..self.real.clone() };
         let scene = Scene::build(real).map_err(|error| error.to_string())?;
-        let file = Placement { scene, quality }.on_a_table().ok_or("not convex")?;
+        let file = Placement { scene, quality }.on_a_table();
         let [_, attitude_nm] = file.control.gains.grasp;
         Ok([(attitude_nm, 0.0), (0.0, 0.0), (0.0, integral_nm_rad)].map(|(attitude_nm, integral_nm_rad)| {
             let mut file = file.clone();

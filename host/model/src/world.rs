@@ -3,7 +3,7 @@
 use super::check::{Result, all_within, fail, item, within};
 use super::file::{PlantSettings, SceneFile};
 use super::{Scene, Start, hand::posture};
-use blindgrasp_body::polyhedron::{Convex, Polyhedron};
+use blindgrasp_body::polyhedron::Polyhedron;
 use blindgrasp_body::{CORNER_STIFFNESS_N_M, ContactFriction, Hand};
 use nalgebra::Vector3;
 
@@ -108,15 +108,10 @@ pub(super) fn frictions(file: &SceneFile) -> Vec<ContactFriction> {
     file.hand.fingertips.iter().map(of).collect()
 }
 
-/// Checks that the object can touch with friction, and that nothing is inside a table at the start.
+/// Checks that nothing is inside a table at the start.
 pub(super) fn at_start(file: &SceneFile, hand: &Hand, shape: &Polyhedron, start: &Start) -> Result<()> {
     if !file.plant.has_friction() {
         return Ok(());
-    }
-    if Convex::of(shape).is_none() {
-        let problem =
-            format!("object `{}` is not convex, which contact with friction needs", file.object.name);
-        return fail("plant.contact", problem, "set it to \"rolling\", or take the object's convex hull");
     }
     let posture = posture(hand, &start.angles_rad);
     for (t, table) in file.plant.tables.iter().enumerate() {

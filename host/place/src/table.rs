@@ -1,7 +1,6 @@
 //! A placed grasp in its user's world: the object has weight and lies on a table, which goes away once it is grasped.
 
 use blindgrasp_body::inverse_kinematics;
-use blindgrasp_body::polyhedron::Convex;
 use blindgrasp_model::file::{ContactLaw, MoveFile, PlantSettings, SceneFile, TableFile};
 use blindgrasp_model::{Scene, posture};
 use nalgebra::Vector3;
@@ -21,11 +20,9 @@ const HELD_S: f64 = 5.0;
 
 impl super::Placement {
     /// The same grasp of an object with weight, with friction, on a table that goes away. A hand without a trunk looks down, along
-    /// the axis that leads to the object; below one with an arm the table stands as tables do. `None` if the object is not
-    /// convex, for which there is no contact with friction yet.
-    pub fn on_a_table(&self) -> Option<SceneFile> {
+    /// the axis that leads to the object; below one with an arm the table stands as tables do.
+    pub fn on_a_table(&self) -> SceneFile {
         let Scene { file, hand, object, start, .. } = &self.scene;
-        Convex::of(object)?;
         let has_trunk = (0..hand.joint_count()).any(|k| inverse_kinematics::is_trunk(hand, k));
         let down = if has_trunk { -Vector3::z() } else { along_an_axis(&start.position_m) };
         let posture = posture(hand, &start.angles_rad);
@@ -49,7 +46,7 @@ impl super::Placement {
             tables: vec![table],
             ..file.plant.clone()
         };
-        Some(SceneFile { duration_s: goes_s + GOING_S + HELD_S, plant, ..file.clone() })
+        SceneFile { duration_s: goes_s + GOING_S + HELD_S, plant, ..file.clone() }
     }
 }
 

@@ -30,6 +30,11 @@ impl Branches {
         }
     }
 
+    /// The finger that a joint belongs to; `None` for a joint of the trunk.
+    pub(super) fn finger(&self, joint: usize) -> Option<usize> {
+        self.fingers.iter().position(|finger| finger.contains(&joint))
+    }
+
     /// The longest chain, to be compared with [`MAX_CHAIN`].
     pub(super) fn longest(&self) -> usize {
         self.fingers.iter().chain([&self.trunk]).map(Vec::len).max().unwrap_or(0)

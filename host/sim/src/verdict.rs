@@ -63,10 +63,10 @@ impl Judge {
         let touching = friction.contacts().iter().filter(|contact| contact.normal_n > 0.0);
         // A table that has gone by half the object's size should have left it in the hand, however far that has sunk.
         let half_size_m = plant.model().object.shape.radius_m();
-        let (mut fingers, mut on_table) = (0, false);
+        let (mut fingers, mut on_table) = (0u32, false);
         for contact in touching {
             match contact.touch.pair {
-                Pair::FingertipObject { .. } => fingers += 1,
+                Pair::FingertipObject { finger, .. } => fingers |= 1 << finger,
                 Pair::ObjectTable { table, .. } => on_table |= friction.table_gone_m(table) > half_size_m,
                 _ => {}
             }
@@ -80,7 +80,7 @@ impl Judge {
         let centres_m = &plant.posture().centres_m[..plant.model().hand.fingertip_count()];
         let middle_m = centres_m.iter().sum::<Vector3<f64>>() / centres_m.len() as f64;
         let there_m = motion.attitude.inverse() * (motion.position_m - middle_m);
-        if fingers >= 2 && self.home_m.is_none() {
+        if fingers.count_ones() >= 2 && self.home_m.is_none() {
             self.home_m = Some(there_m);
         }
         match self.home_m {

@@ -53,6 +53,7 @@ pub fn world(scene: &Scene) -> Option<World> {
             let plant = plant.clone();
             Path::new(move |t_s| gravity_m_s2(&plant, t_s) - shaking_m_s2(&plant, t_s))
         }),
+        ..World::default()
     })
 }
 

@@ -134,6 +134,48 @@ pub fn plate() -> Mesh {
     mesh
 }
 
+/// An octahedron of 30 mm with its top pushed in: a pit, whose bottom is a vertex with concave edges only.
+pub fn pit() -> Mesh {
+    let side = |x: f64, y: f64| Vector3::new(0.03 * x, 0.03 * y, 0.0);
+    let vertices = vec![
+        side(1.0, 0.0),
+        side(0.0, 1.0),
+        side(-1.0, 0.0),
+        side(0.0, -1.0),
+        Vector3::new(0.0, 0.0, -0.03),
+        Vector3::new(0.002, 0.003, -0.01),
+    ];
+    let around = [[0, 1], [1, 2], [2, 3], [3, 0]];
+    let triangles = around.iter().flat_map(|&[a, b]| [[b, a, 4], [a, b, 5]]).collect();
+    (vertices, triangles)
+}
+
+/// A block of 60 x 40 x 20 mm and a little more, whose top is two faces that fall to a concave edge in its middle, at 5 degrees each.
+pub fn valley() -> Mesh {
+    let (w, d, h) = (0.03, 0.02, 0.03 * 0.0875);
+    let at = |x: f64, y: f64, z: f64| Vector3::new(x, y, z);
+    let vertices = vec![
+        at(-w, -d, 0.0),
+        at(w, -d, 0.0),
+        at(w, -d, 0.02 + h),
+        at(0.0, -d, 0.02),
+        at(-w, -d, 0.02 + h),
+        at(-w, d, 0.0),
+        at(w, d, 0.0),
+        at(w, d, 0.02 + h),
+        at(0.0, d, 0.02),
+        at(-w, d, 0.02 + h),
+    ];
+    let front = [[0, 1, 3], [1, 2, 3], [0, 3, 4]];
+    let mut triangles: Vec<[usize; 3]> = front.to_vec();
+    triangles.extend(front.map(|[a, b, c]| [a + 5, c + 5, b + 5]));
+    for k in 0..5 {
+        let next = (k + 1) % 5;
+        triangles.extend([[next, k, k + 5], [next, k + 5, next + 5]]);
+    }
+    (vertices, triangles)
+}
+
 fn extrude(outline_mm: &[[i32; 2]], cap: &[[usize; 3]], height_mm: i32) -> Mesh {
     let mut mesh = lids(outline_mm, cap, height_mm);
     sides(&mut mesh.1, &(0..outline_mm.len()).collect::<Vec<_>>(), outline_mm.len());

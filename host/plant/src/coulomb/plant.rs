@@ -8,11 +8,13 @@
 //!   sticking contacts where these are half a step later. That only takes energy; it is booked as friction.
 
 use super::linear::{Four, add_scaled};
+use super::links::Links;
 use super::material::Response;
+use super::placed::{Placed, Surfaces};
 use super::rows::Rows;
 use super::solve::{Counters, Problem};
-use super::stiffness::{Materials, limits};
-use super::touch::{Pair, Placed, Touch};
+use super::stiffness::{Materials, limits, object_yields_per_kg};
+use super::touch::{Pair, Touch};
 use super::world::{Table, World, WorldError};
 use crate::friction::{FrictionTorque, stretch, torque};
 use crate::ledger::Flows;
@@ -22,7 +24,7 @@ use crate::push::share;
 use crate::rotation::{solve_inertia, turn_freely};
 use crate::vectors::{Everything, add, combine, head, set_tail, set_velocities, tail, velocities};
 use blindgrasp_body::dynamics::{JointVector, bias_torques};
-use blindgrasp_body::polyhedron::Convex;
+use blindgrasp_body::polyhedron::Touchable;
 use blindgrasp_body::{MAX_CHAIN, MAX_FINGERS, MAX_JOINTS, Posture};
 use nalgebra::Vector3;
 
@@ -45,8 +47,7 @@ const FAR_M: f64 = 0.01;
 pub struct Plant {
     model: PlantModel,
     world: World,
-    shape: Convex,
-    materials: Materials,
+    surfaces: Surfaces,
     substep_s: f64,
     motion: Motion,
     /// Velocities at the half step before.
@@ -75,6 +76,8 @@ pub struct Plant {
     guesses_m_s: Vec<f64>,
     /// Velocities of the contacts' tables, as their rows feel them.
     tables_m_s: Vec<Four>,
+    /// Contacts that take away what others have too much.
+    reliefs: Vec<Relief>,
     problem: Problem,
     projection: Problem,
     contacts: Vec<Contact>,
@@ -93,6 +96,14 @@ pub struct Plant {
     as_rolling: bool,
 }
 
+/// A contact that takes away what others have too much, with velocities extrapolated: next to what it takes away.
+#[derive(Clone, Debug)]
+struct Relief {
+    touch: Touch,
+    rows: Rows,
+    response: Response,
+}
+
 impl Plant {
     /// Puts a plant at a motion, to be advanced by `substep_s` at a time. Contacts of a plant at rest stick from the start.
     ///
@@ -103,27 +114,45 @@ impl Plant {
         if longest > MAX_CHAIN {
             return Err(ModelError::ChainTooLong { joints: longest }.into());
         }
-        let shape = world.check(model.hand.fingertip_count(), &model.object.shape)?;
-        let mut plant = Self {
+        world.check(model.hand.fingertip_count())?;
+        let mut mass = MassFactor::new(&model.hand);
+        let mut now = Placed::new();
+        now.place(&model, &motion.angles_rad, motion.position_m, motion.attitude);
+        let inertia_kg_m2 = now.inertia_kg_m2(&model);
+        let object = ObjectMass { mass_kg: model.object.mass_kg, inertia_kg_m2 };
+        if !(mass.factorize(&now.mass, &[0.0; MAX_JOINTS], &object) > LEAST_PIVOT) {
+            return Err(ModelError::NoMass.into());
+        }
+        let yields_per_kg = object_yields_per_kg(&model.object);
+        let mut surfaces = Surfaces {
+            object: Touchable::of(&model.object.shape),
             materials: Materials::new(&model, substep_s),
-            shape,
+            links: Links::new((&model, &world), &now, &mass, yields_per_kg, substep_s),
+            places: Vec::new(),
+        };
+        if model.joint_limits {
+            surfaces.materials.limits = limits(&mass, model.hand.joint_count(), substep_s);
+        }
+        let mut plant = Self {
+            surfaces,
             substep_s,
             motion,
             before: velocities(&motion),
-            spin_momentum: Vector3::zeros(),
+            spin_momentum: inertia_kg_m2 * motion.spin_rad_s,
             previous: velocities(&motion),
             stretch_rad: [0.0; MAX_JOINTS],
             started: false,
             steps: 0,
-            now: Placed::new(),
+            now,
             ahead: Placed::new(),
-            mass: MassFactor::new(&model.hand),
+            mass,
             touches: Vec::new(),
             rows: Vec::new(),
             felt: Vec::new(),
             rates_m_s: Vec::new(),
             guesses_m_s: Vec::new(),
             tables_m_s: Vec::new(),
+            reliefs: Vec::new(),
             problem: Problem::default(),
             projection: Problem::default(),
             contacts: Vec::new(),
@@ -139,19 +168,10 @@ impl Plant {
             model,
             world,
         };
-        plant.place();
-        let inertia_kg_m2 = plant.now.inertia_kg_m2(&plant.model);
-        plant.spin_momentum = inertia_kg_m2 * motion.spin_rad_s;
-        let object = ObjectMass { mass_kg: plant.model.object.mass_kg, inertia_kg_m2 };
-        if !(plant.mass.factorize(&plant.now.mass, &[0.0; MAX_JOINTS], &object) > LEAST_PIVOT) {
-            return Err(ModelError::NoMass.into());
-        }
-        if plant.model.joint_limits {
-            plant.materials.limits = limits(&plant.mass, plant.model.hand.joint_count(), substep_s);
-        }
         if motion == Motion::at_rest(motion.angles_rad, motion.position_m, motion.attitude) {
-            let Self { now, model, world, shape, materials, stuck, .. } = &mut plant;
-            now.touches((model, world), (shape, materials), 0.0, FAR_M, |touch| {
+            let Self { now, model, world, surfaces, stuck, before, .. } = &mut plant;
+            surfaces.links.update(now, (model, world), &surfaces.object, (before, 0.0), (0.0, substep_s));
+            now.touches((model, world), surfaces, 0.0, FAR_M, |touch| {
                 if touch.depth_m > 0.0 {
                     stuck.push(touch.pair);
                 }
@@ -224,7 +244,9 @@ impl Plant {
 
     /// Elastic energy of all contacts and joint limits, J.
     pub fn elastic_energy_j(&self) -> f64 {
-        self.touches.iter().map(|touch| touch.material.energy_j(touch.depth_m)).sum()
+        let energy_j = |touch: &Touch| touch.material.energy_j(touch.depth_m);
+        let taken_away_j: f64 = self.reliefs.iter().map(|relief| energy_j(&relief.touch)).sum();
+        self.touches.iter().map(energy_j).sum::<f64>() - taken_away_j
     }
 
     /// Returns the flows in and out of kinetic and elastic energy from the start to this instant, after [`Self::solve`]: work,
@@ -248,8 +270,8 @@ impl Plant {
         if !(self.mass.factorize(&self.now.mass, &softness, &object) > LEAST_PIVOT) {
             return Err(Lost::Diverged);
         }
+        self.collect(&mut push);
         self.mass.whiten(&mut push);
-        self.collect();
         self.set_problem(tau, &push);
 
         let Self { touches, rates_m_s, guesses_m_s, problem, as_rolling, started, .. } = self;
@@ -366,49 +388,64 @@ impl Plant {
         }
     }
 
-    /// Collects the contacts that touch or may touch within this step.
-    fn collect(&mut self) {
-        let t_s = self.time_s();
+    /// Collects the contacts that touch or may touch within this step. Adds the forces of those that only take away.
+    fn collect(&mut self, push: &mut Everything) {
+        let (t_s, path_s) = (self.time_s(), self.path_s());
         let fastest = head(&self.before.object).norm()
             + tail(&self.before.object).norm() * self.model.object.shape.radius_m();
+        let about_now = velocities(&self.motion);
         let Self {
             now,
             model,
             world,
-            shape,
-            materials,
+            surfaces,
             mass,
             touches,
             rows,
             felt,
             rates_m_s,
+            reliefs,
             before,
             substep_s,
             as_rolling,
+            started,
             ..
         } = self;
         touches.clear();
         felt.clear();
         rates_m_s.clear();
+        reliefs.clear();
         let far_m = FAR_M + 2.0 * *substep_s * fastest;
-        now.touches((model, world), (shape, materials), t_s, far_m, |touch| {
+        let way_m = |table: &Table| (table.point_m.at(t_s) - table.point_m.at(t_s - *substep_s)).norm();
+        let tables_m = world.tables.iter().map(way_m).fold(0.0, f64::max);
+        surfaces.links.update(now, (model, world), &surfaces.object, (before, tables_m), (t_s, *substep_s));
+        let tau = 0.5 * *substep_s;
+        now.touches((model, world), surfaces, t_s, far_m, |touch| {
             let table_m_s = table_velocity(world, touch, (t_s - *substep_s, t_s));
             let own = room(rows, touches.len());
-            now.set_rows(&model.hand, &mass.branches, touch, own);
+            now.set_rows((model, world), &mass.branches, touch, own);
             let feels = own.times(&mass.branches, before);
             let gap_m_s = feels[0] + touch.normal.dot(&table_m_s);
-            if touch.depth_m + 2.0 * *substep_s * gap_m_s.abs() + NEAR > 0.0 {
-                touches.push(*touch);
-                felt.push(feels);
-                rates_m_s.push(-gap_m_s);
-                for sign in [1.0, -1.0].into_iter().filter(|_| *as_rolling) {
-                    if let Some(touch) = touch.viscous_torsion(sign, &model.fingertips) {
-                        let own = room(rows, touches.len());
-                        now.set_rows(&model.hand, &mass.branches, &touch, own);
-                        felt.push(own.times(&mass.branches, before));
-                        rates_m_s.push(-felt[touches.len()][0]);
-                        touches.push(touch);
-                    }
+            if !(touch.depth_m + 2.0 * *substep_s * gap_m_s.abs() + NEAR > 0.0) {
+                return;
+            }
+            if touch.is_negative {
+                let rate_m_s = -own.times(&mass.branches, &about_now)[0];
+                let response = respond(touch, -gap_m_s, rate_m_s, (path_s, tau), (*started, *as_rolling));
+                own.push(&mass.branches, &[-response.force_n.max(0.0), 0.0, 0.0, 0.0], push);
+                reliefs.push(Relief { touch: *touch, rows: *own, response });
+                return;
+            }
+            touches.push(*touch);
+            felt.push(feels);
+            rates_m_s.push(-gap_m_s);
+            for sign in [1.0, -1.0].into_iter().filter(|_| *as_rolling) {
+                if let Some(touch) = touch.viscous_torsion(sign, &model.fingertips) {
+                    let own = room(rows, touches.len());
+                    now.set_rows((model, world), &mass.branches, &touch, own);
+                    felt.push(own.times(&mass.branches, before));
+                    rates_m_s.push(-felt[touches.len()][0]);
+                    touches.push(touch);
                 }
             }
         });

@@ -169,10 +169,16 @@ impl Problem {
         if i <= j { self.delassus[i * n + j] } else { transposed(&self.delassus[j * n + i]) }
     }
 
-    /// The contact's force is inside of the cone.
+    /// The contact's force is inside of the cone, by more than the error that forces have.
     pub(super) fn sticks(&self, contact: usize) -> bool {
         let (place, forces) = (&self.places[contact], &self.forces[contact]);
-        place.tangents > 0 && length(&forces[1..]) < place.radius(forces) * (1.0 - 1e-9)
+        let error_n = 10.0 * TOLERANCE * self.largest_n();
+        place.tangents > 0 && length(&forces[1..]) < place.radius(forces) - error_n
+    }
+
+    /// The largest normal force.
+    fn largest_n(&self) -> f64 {
+        self.forces.iter().fold(0.0, |largest: f64, forces| largest.max(forces[0]))
     }
 
     /// Solves. `law` gives a contact's normal force for the rate of its depth; `rates` are the first guess.
@@ -237,7 +243,7 @@ impl Problem {
 
     /// The normal forces are those of the laws, not only of their linearizations.
     fn is_consistent(&self) -> bool {
-        let scale = self.forces.iter().fold(0.0, |scale: f64, forces| scale.max(forces[0]));
+        let scale = self.largest_n();
         self.places.iter().zip(&self.forces).all(|(place, forces)| {
             let lawful = place.law.force_n.max(0.0);
             !((lawful - forces[0]).abs() > 10.0 * TOLERANCE * scale.max(lawful))

@@ -1,7 +1,7 @@
 //! The parts of the world that only contact with friction knows: tables, friction, gravity that turns.
 
+use blindgrasp_body::Capsule;
 pub use blindgrasp_body::ContactFriction as Friction;
-use blindgrasp_body::polyhedron::{Convex, Polyhedron};
 use nalgebra::Vector3;
 use std::fmt;
 use std::sync::Arc;
@@ -54,6 +54,10 @@ pub struct World {
     pub fingertip_friction: Vec<Friction>,
     /// Tables.
     pub tables: Vec<Table>,
+    /// Links and palm of the hand, as far as they touch anything.
+    pub capsules: Vec<Capsule>,
+    /// Coefficient of Coulomb friction of each of them against the object, and against the hand.
+    pub capsule_friction: Vec<f64>,
     /// Gravity on hand and object, m/s^2, in place of the model's constants: of a hand that is turned or shaken.
     pub gravity_m_s2: Option<Path>,
 }
@@ -61,16 +65,15 @@ pub struct World {
 /// The reason for which a world can't be simulated.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum WorldError {
-    /// The object is not convex.
-    #[error("the object is not convex: contact with friction needs a convex object")]
-    NotConvex,
-    /// Not one friction a fingertip.
-    #[error("there are {given} frictions for {fingertips} fingertips: give one each")]
-    Fingertips {
+    /// Not one friction a fingertip or a capsule.
+    #[error("there are {given} frictions for {parts} {what}: give one each")]
+    Frictions {
         /// Frictions.
         given: usize,
-        /// Fingertips.
-        fingertips: usize,
+        /// Fingertips or capsules.
+        what: &'static str,
+        /// Their number.
+        parts: usize,
     },
     /// A number is not what it has to be.
     #[error("{what} is {value}: it has to be finite and not negative")]
@@ -92,10 +95,15 @@ pub enum WorldError {
 }
 
 impl World {
-    /// Checks the world of a hand and an object. Returns the object's shape, prepared.
-    pub(super) fn check(&self, fingertips: usize, shape: &Polyhedron) -> Result<Convex, WorldError> {
-        if self.fingertip_friction.len() != fingertips {
-            return Err(WorldError::Fingertips { given: self.fingertip_friction.len(), fingertips });
+    /// Checks the world of a hand.
+    pub(super) fn check(&self, fingertips: usize) -> Result<(), WorldError> {
+        for (given, what, parts) in [
+            (self.fingertip_friction.len(), "fingertips", fingertips),
+            (self.capsule_friction.len(), "capsules", self.capsules.len()),
+        ] {
+            if given != parts {
+                return Err(WorldError::Frictions { given, what, parts });
+            }
         }
         let frictions =
             self.fingertip_friction.iter().chain(self.tables.iter().map(|t| &t.fingertip_friction));
@@ -106,7 +114,8 @@ impl World {
                     ("a torsional friction", friction.torsion_m),
                 ]
             })
-            .chain(self.tables.iter().map(|table| ("a table's friction", table.object_friction)));
+            .chain(self.tables.iter().map(|table| ("a table's friction", table.object_friction)))
+            .chain(self.capsule_friction.iter().map(|&sliding| ("a capsule's friction", sliding)));
         for (what, value) in numbers {
             if !(value >= 0.0 && value.is_finite()) {
                 return Err(WorldError::Number { what, value });
@@ -115,15 +124,13 @@ impl World {
         if let Some(table) = self.tables.iter().position(|t| !((t.normal.norm() - 1.0).abs() < 1e-9)) {
             return Err(WorldError::Normal { table });
         }
-        Convex::of(shape).ok_or(WorldError::NotConvex)
+        Ok(())
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use blindgrasp_body::polyhedron::Flatness;
-    use blindgrasp_meshes::bracket;
 
     fn world() -> World {
         World { fingertip_friction: vec![Friction { sliding: 0.6, torsion_m: 0.002 }; 3], ..World::default() }
@@ -132,8 +139,7 @@ mod tests {
     fn said(change: impl Fn(&mut World)) -> String {
         let mut world = world();
         change(&mut world);
-        let cube = Polyhedron::cuboid([0.05; 3]).unwrap();
-        world.check(3, &cube).map_or_else(|error| error.to_string(), |_| "fine".to_owned())
+        world.check(3).map_or_else(|error| error.to_string(), |_| "fine".to_owned())
     }
 
     #[test]
@@ -160,9 +166,9 @@ mod tests {
             said(|world| world.tables.push(table(Vector3::new(0.0, 1.0, 1.0)))),
             "the normal of table 1 is not a unit vector"
         );
-        let (vertices, triangles) = bracket();
-        let flatness = Flatness { angle_rad: 1e-3, distance_m: 1e-6 };
-        let bracket = Polyhedron::mesh(&vertices, &triangles, &flatness).unwrap();
-        assert_eq!(world().check(3, &bracket).unwrap_err(), WorldError::NotConvex);
+        assert_eq!(
+            said(|world| world.capsule_friction.push(0.5)),
+            "there are 1 frictions for 0 capsules: give one each"
+        );
     }
 }

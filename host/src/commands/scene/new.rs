@@ -106,12 +106,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
     let [hand, object] = references;
     let is_on_table = !(arguments.ideal || arguments.rolling);
     if is_on_table && let Some(best) = placements.first_mut() {
-        match best.on_a_table() {
-            Some(file) => best.scene = Scene::build(file)?,
-            None => eprintln!(
-                "blindgrasp: the object is not convex, which contact with friction needs: the scene is the paper's world, without weight and slip"
-            ),
-        }
+        best.scene = Scene::build(best.on_a_table())?;
     }
     let summary = Simulation::new(&placements[0].scene)?.run().summary;
     let outcome = in_words(&summary);

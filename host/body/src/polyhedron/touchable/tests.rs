@@ -1,69 +1,26 @@
 use super::super::Flatness;
 use super::*;
 use crate::polyhedron::clearance::nearest;
-use blindgrasp_meshes::{Mesh, Numbers, bracket, plate};
+use blindgrasp_meshes::{Mesh, Numbers, bracket, pit, plate, valley};
 
 fn body((vertices, triangles): &Mesh) -> Polyhedron {
     let flatness = Flatness { angle_rad: 1e-6, distance_m: 1e-9 };
     Polyhedron::mesh(vertices, triangles, &flatness).unwrap()
 }
 
-/// An octahedron of 30 mm with the top pushed in: a pit, whose bottom is a vertex with concave edges only.
-fn pit() -> Mesh {
-    let side = |x: f64, y: f64| Vector3::new(0.03 * x, 0.03 * y, 0.0);
-    let vertices = vec![
-        side(1.0, 0.0),
-        side(0.0, 1.0),
-        side(-1.0, 0.0),
-        side(0.0, -1.0),
-        Vector3::new(0.0, 0.0, -0.03),
-        Vector3::new(0.002, 0.003, -0.01),
-    ];
-    let around = [[0, 1], [1, 2], [2, 3], [3, 0]];
-    let triangles = around.iter().flat_map(|&[a, b]| [[b, a, 4], [a, b, 5]]).collect();
-    (vertices, triangles)
-}
-
-/// Two bars, one across the other and half sunk into it, askew: saddles at vertices, edges of every kind.
-fn step() -> Mesh {
+/// An L, sheared: nothing is at right angles.
+fn sheared() -> Mesh {
     let (mut vertices, triangles) = bracket();
     for vertex in &mut vertices {
-        // Shears: nothing is at right angles.
         vertex.x += 0.3 * vertex.y + 0.2 * vertex.z;
         vertex.z += 0.1 * vertex.x;
     }
     (vertices, triangles)
 }
 
-/// A roof whose ridge is concave, by ten degrees.
-fn valley() -> Mesh {
-    let (w, d, h) = (0.03, 0.02, 0.03 * 0.0875);
-    let at = |x: f64, y: f64, z: f64| Vector3::new(x, y, z);
-    let vertices = vec![
-        at(-w, -d, 0.0),
-        at(w, -d, 0.0),
-        at(w, -d, 0.02 + h),
-        at(0.0, -d, 0.02),
-        at(-w, -d, 0.02 + h),
-        at(-w, d, 0.0),
-        at(w, d, 0.0),
-        at(w, d, 0.02 + h),
-        at(0.0, d, 0.02),
-        at(-w, d, 0.02 + h),
-    ];
-    let front = [[0, 1, 3], [1, 2, 3], [0, 3, 4]];
-    let mut triangles: Vec<[usize; 3]> = front.to_vec();
-    triangles.extend(front.map(|[a, b, c]| [a + 5, c + 5, b + 5]));
-    for k in 0..5 {
-        let next = (k + 1) % 5;
-        triangles.extend([[next, k, k + 5], [next, k + 5, next + 5]]);
-    }
-    (vertices, triangles)
-}
-
 fn bodies() -> Vec<(Polyhedron, i32)> {
     // With their Euler characteristics: the plate has a tunnel.
-    [(bracket(), 1), (plate(), 0), (pit(), 1), (step(), 1), (valley(), 1)]
+    [(bracket(), 1), (plate(), 0), (pit(), 1), (sheared(), 1), (valley(), 1)]
         .iter()
         .map(|(mesh, euler)| (body(mesh), *euler))
         .collect()

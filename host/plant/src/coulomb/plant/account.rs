@@ -1,6 +1,6 @@
 //! The account of a solved instant: contacts with their forces, and the powers that flow.
 
-use super::Plant;
+use super::{Plant, Relief};
 use crate::coulomb::linear::{Four, dot};
 use crate::coulomb::solve::Problem;
 use crate::coulomb::touch::{Pair, Touch};
@@ -69,12 +69,14 @@ impl Contact {
 }
 
 impl Plant {
-    /// A fingertip against the object at this instant, after [`Self::solve`].
+    /// A fingertip against the object at this instant, after [`Self::solve`]: all its forces, at the place where it presses most.
     pub(crate) fn finger(&self, finger: usize) -> FingerContact {
-        let pair = Pair::FingertipObject { finger };
-        let known = self.contacts.iter().find(|contact| contact.touch.pair == pair);
+        let is_mine =
+            |touch: &Touch| matches!(touch.pair, Pair::FingertipObject { finger: of, .. } if of == finger);
+        let mine = || self.contacts.iter().filter(|contact| is_mine(&contact.touch));
+        let known = mine().reduce(|a, b| if b.normal_n > a.normal_n { b } else { a });
         let touch = known.map_or_else(
-            || self.now.fingertip_touch((&self.model, &self.world), (&self.shape, &self.materials), finger),
+            || self.now.fingertip_touch(&self.model, &self.surfaces.object, finger),
             |contact| contact.touch,
         );
         let Touch { normal, point_m, depth_m, .. } = touch;
@@ -83,12 +85,20 @@ impl Plant {
         let near = if normal.dot(&along).abs() < 0.9 { along } else { across };
         let z = (near - normal * normal.dot(&near)).normalize();
         let x = normal.cross(&z);
-        let force = known.map_or_else(ContactForce::default, |contact| ContactForce {
+        let mut force = known.map_or_else(ContactForce::default, |contact| ContactForce {
             normal_n: contact.normal_n,
             lambda_x_n: -x.dot(&contact.force_n()),
             lambda_z_n: -z.dot(&contact.force_n()),
             torsion_nm: contact.torsion_nm,
         });
+        let others = mine().filter(|contact| contact.touch.pair != touch.pair).map(Contact::force_n);
+        let taken = self.reliefs.iter().filter(|relief| is_mine(&relief.touch));
+        let taken = taken.map(|relief| relief.touch.normal * -relief.response.force_n.max(0.0));
+        for force_n in others.chain(taken) {
+            force.normal_n += normal.dot(&force_n);
+            force.lambda_x_n -= x.dot(&force_n);
+            force.lambda_z_n -= z.dot(&force_n);
+        }
         let lever_m = point_m - self.motion.position_m;
         FingerContact {
             frame: Matrix3::from_columns(&[x, normal, z]),
@@ -98,8 +108,8 @@ impl Plant {
             rolling_radius_m: self.model.fingertips[finger].radius_m - depth_m,
             force,
             friction: Some(FrictionState {
-                used: known.map_or(0.0, Contact::used),
-                limit_n: known.map_or(0.0, |contact| contact.touch.friction.sliding * contact.normal_n),
+                used: mine().map(Contact::used).fold(0.0, f64::max),
+                limit_n: mine().map(|contact| contact.touch.friction.sliding * contact.normal_n).sum(),
                 slipped_m: self.slipped_m[finger],
             }),
         }
@@ -108,7 +118,7 @@ impl Plant {
     /// Adds what contacts of fingertips and object slip in so much time.
     pub(super) fn count_slip(&mut self, time_s: f64) {
         for contact in self.contacts.iter().filter(|contact| contact.normal_n > 0.0 && !contact.sticks) {
-            if let Pair::FingertipObject { finger } = contact.touch.pair {
+            if let Pair::FingertipObject { finger, .. } = contact.touch.pair {
                 let [_, x, z] = contact.velocity_m_s;
                 self.slipped_m[finger] += time_s * x.hypot(z);
             }
@@ -145,6 +155,10 @@ impl Plant {
             flows.slip -= dot(&[0.0, forces[1], forces[2], forces[3]], velocities);
             // The table is the second body: what it takes from it is the negative of the force on it.
             flows.tables -= dot(forces, &self.tables_m_s[k]);
+        }
+        for Relief { rows, response, .. } in &self.reliefs {
+            let rate = -rows.times(&self.mass.branches, solution)[0];
+            flows.indentation -= (response.force_n.max(0.0) - response.elastic_n) * rate;
         }
         let object = &solution.object;
         flows.pushes = dot6(&self.pushed, object);

@@ -18,7 +18,7 @@ impl Plant {
             return;
         }
         let (h, t_s) = (self.substep_s, self.time_s());
-        let Self { ahead, model, world, shape, materials, motion, before, spin_momentum, stuck, .. } = self;
+        let Self { ahead, model, world, surfaces, motion, before, spin_momentum, stuck, .. } = self;
         let mut angles_rad = motion.angles_rad;
         for (angle, speed) in angles_rad.iter_mut().zip(&before.joints) {
             *angle += 0.5 * h * speed;
@@ -33,8 +33,8 @@ impl Plant {
 
         let Self { touches, rows, mass, problem, projection, .. } = self;
         touches.clear();
-        ahead.touches((model, world), (shape, materials), t_s + 0.5 * h, f64::INFINITY, |touch| {
-            if stuck.contains(&touch.pair) {
+        ahead.touches((model, world), surfaces, t_s + 0.5 * h, f64::INFINITY, |touch| {
+            if !touch.is_negative && stuck.contains(&touch.pair) {
                 touches.push(*touch);
             }
         });
@@ -46,7 +46,7 @@ impl Plant {
         let table_m_s = |touch: &Touch| touch.feels(&table_velocity(world, touch, (t_s, t_s + h)));
         for (k, touch) in touches.iter().enumerate() {
             let own = room(rows, k);
-            ahead.set_rows(&model.hand, &mass.branches, touch, own);
+            ahead.set_rows((model, world), &mass.branches, touch, own);
             let mut free = own.times(&mass.branches, &half);
             add_scaled(&mut free, 1.0, &table_m_s(touch));
             projection.add(touch.tangents(), touch.friction.sliding, free, [0.0; 4]);

@@ -110,8 +110,13 @@ impl Plant {
             .zip(&self.rates_m_s)
             .map(|(touch, rate)| touch.material.energy_j(touch.depth_m - 0.5 * self.substep_s * rate))
             .sum();
+        let taken_away = |relief: &Relief| {
+            let rate = -relief.rows.times(&self.mass.branches, &self.before)[0];
+            relief.touch.material.energy_j(relief.touch.depth_m - 0.5 * self.substep_s * rate)
+        };
+        let taken_away: f64 = self.reliefs.iter().map(taken_away).sum();
         let object = self.model.object.mass_kg * v.norm_squared() + spin.dot(&self.spin_momentum);
-        0.5 * (object + joints) + elastic
+        0.5 * (object + joints) + elastic - taken_away
     }
 
     /// Moves on by a time under constant torques.

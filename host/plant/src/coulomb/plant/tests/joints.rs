@@ -43,7 +43,7 @@ fn an_end_stop_holds_a_joint() {
     plant.model.object_gravity_m_s2 = Vector3::zeros();
     let mut deepest_rad: f64 = 0.0;
     plant.run(&[TORQUE_NM], 0.5, |plant| deepest_rad = deepest_rad.max(plant.motion().angles_rad[0] - 1.0));
-    let stiffness = plant.materials.limits[0].linear_n_m;
+    let stiffness = plant.surfaces.materials.limits[0].linear_n_m;
     let sunk_rad = plant.motion().angles_rad[0] - 1.0;
     let flows = plant.flows();
     let off_j = plant.kinetic_energy_j() + plant.elastic_energy_j() + flows.dissipated() - flows.motors;

@@ -3,6 +3,8 @@
 use super::*;
 use crate::coulomb::plant::tests::tables::cube;
 use crate::coulomb::stiffness::corner;
+use blindgrasp_body::polyhedron::{Face, Flatness};
+use blindgrasp_meshes::valley;
 
 /// What is compared: object's position, m, and attitude, as a rotation vector times 3 cm; and joint angles times 3 cm.
 fn state(plant: &Plant) -> Vec<f64> {
@@ -33,17 +35,16 @@ fn errors(steps_s: &[f64], time_s: f64, torques_nm: &[f64], scene: &dyn Fn(f64) 
     steps_s.iter().map(|&substep_s| difference(&path(substep_s))).collect()
 }
 
-/// Prints the errors, on average over scenes whose events fall into other phases of the step. Returns the order over all
+/// Prints the errors, on average over scenes whose events fall into so many phases of the step. Returns the order over all
 /// halvings.
-fn order(name: &str, time_s: f64, torques_nm: &[f64], scene: &dyn Fn(f64, f64) -> Plant) -> f64 {
-    const PHASES: u32 = 6;
+fn order(name: &str, phases: u32, time_s: f64, torques_nm: &[f64], scene: &dyn Fn(f64, f64) -> Plant) -> f64 {
     let steps_s = [4e-4, 2e-4, 1e-4, 5e-5];
     let mut mean = [0.0; 4];
-    for phase in 0..PHASES {
-        let phase = f64::from(phase) / f64::from(PHASES);
+    for phase in 0..phases {
+        let phase = f64::from(phase) / f64::from(phases);
         let errors = errors(&steps_s, time_s, torques_nm, &|substep_s| scene(substep_s, phase));
         for (mean, error) in mean.iter_mut().zip(&errors) {
-            *mean += error / f64::from(PHASES);
+            *mean += error / f64::from(phases);
         }
     }
     println!("{name}");
@@ -87,8 +88,8 @@ fn on_table(start: Motion, friction: f64, gravity: Path, damping: f64) -> impl F
         }
         start.velocity_m_s *= 1.0 + 0.02 * phase;
         let mut plant = Plant::new(model, world, start, substep_s).unwrap();
-        plant.materials.corner = material;
-        plant.materials.corner.damping[0] *= damping;
+        plant.surfaces.materials.corner = material;
+        plant.surfaces.materials.corner.damping[0] *= damping;
         plant
     }
 }
@@ -105,10 +106,8 @@ fn resting() -> Motion {
 
 /// Tolerance of all: order 1.9 over three halvings.
 fn assert_second_order(name: &str, time_s: f64, torques_nm: &[f64], scene: &dyn Fn(f64, f64) -> Plant) {
-    let order = order(name, time_s, torques_nm, scene);
-    if order <= 1.9 {
-        println!("BAD {name}: {order:.2}");
-    }
+    let order = order(name, 6, time_s, torques_nm, scene);
+    assert!(order > 1.9, "{name}: {order:.2}");
 }
 
 /// A cube falls on a corner, slips or sticks there, and leaves the table again.
@@ -139,7 +138,9 @@ fn slip_to_stick() {
     let mut start = resting();
     start.velocity_m_s = Vector3::new(0.2, 0.1, 0.0);
     start.spin_rad_s = Vector3::new(0.0, 0.0, 2.0);
-    assert_second_order("slip to stick", 0.15, &[], &on_table(start, 0.4, weight(), 1.0));
+    // The error hangs on the phase at which it stops: it takes more of them for an average.
+    let order = order("slip to stick", 24, 0.15, &[], &on_table(start, 0.4, weight(), 1.0));
+    assert!(order > 1.9, "{order:.2}");
 }
 
 /// A fingertip that comes from beside a free cube, over its edge, across its face, and over the other edge; without gravity.
@@ -177,25 +178,76 @@ fn over_the_edge() {
     }
 }
 
+/// A body that slides past a fingertip, on which it leans: down into a valley of ten degrees and out of it again.
+fn through_a_valley(friction: Friction, substep_s: f64, phase: f64) -> Plant {
+    let (vertices, triangles) = valley();
+    let flatness = Flatness { angle_rad: 1e-3, distance_m: 1e-6 };
+    let shape = Polyhedron::mesh(&vertices, &triangles, &flatness).unwrap();
+    // Over the left face, 1.1 mm deep.
+    let on_left = |face: &&Face| face.normal.z > 0.9 && face.normal.x > 0.0;
+    let left = shape.faces.iter().find(on_left).unwrap();
+    let (out, edge_m) = (left.normal, shape.vertices_m[3]);
+    let tip_m = edge_m + out * (TIP.radius_m - 1.1e-3) + out.cross(&Vector3::y()) * (0.018 + 1e-4 * phase);
+    // Arms turn about the vertical: the body lies on its side.
+    let on_its_side = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::FRAC_PI_2);
+    let tip_m = on_its_side * Vector3::new(tip_m.x, 0.0, tip_m.z);
+    let fingers =
+        [arm(tip_m - Vector3::x(), tip_m), arm(Vector3::new(1.0, 0.0, 0.0), Vector3::new(1.1, 0.0, 0.0))];
+    let mut model = model(hand(&fingers), object(shape, 3.0));
+    model.object_gravity_m_s2 = Vector3::new(0.0, -1.0, 0.0);
+    let mut start = at(Vector3::zeros());
+    start.attitude = on_its_side;
+    start.velocity_m_s.x = -0.4;
+    let world = World { fingertip_friction: vec![friction; 2], ..World::default() };
+    Plant::new(model, world, start, substep_s).unwrap()
+}
+
+/// A fingertip over a concave edge: it slips all the time, or sticks and rolls.
+#[test]
+fn over_a_concave_edge() {
+    for (sliding, torsion_m) in [(0.0, 0.0), (0.3, 0.002), (3.0, 0.002)] {
+        let friction = Friction { sliding, torsion_m };
+        let mut seen = vec![];
+        through_a_valley(friction, 1e-4, 0.0).run(&[3.0], 0.1, |plant| {
+            let pressed = plant.contacts().iter().filter(|contact| contact.normal_n > 0.0).count();
+            let place = (pressed, plant.reliefs.len());
+            if seen.last() != Some(&place) {
+                seen.push(place);
+            }
+        });
+        println!("{seen:?}");
+        assert!(seen.contains(&(2, 1)), "it is on both sides at once: {seen:?}");
+        let scene = |substep_s: f64, phase: f64| through_a_valley(friction, substep_s, phase);
+        assert_second_order(&format!("over a concave edge, {friction:?}"), 0.1, &[3.0], &scene);
+    }
+}
+
 /// The same, seen by the ledger: what kinetic and elastic energy changed by, once it is over, is what flowed.
 ///
-/// Tolerance: 1e-3 of the energy that the contact takes up, falling with the square of the step.
+/// Tolerance: 1e-3 of the energy that the contact takes up, falling with the square of the step over one edge, at least with the step
+/// where places come and go.
 #[test]
 fn the_ledger_closes_over_edges() {
+    ledger_closes(0.12, &[], 10.0, &over_edges);
+    ledger_closes(0.1, &[3.0], 4.0, &through_a_valley);
+}
+
+fn ledger_closes(time_s: f64, torques_nm: &[f64], falls: f64, scene: &dyn Fn(Friction, f64, f64) -> Plant) {
     for sliding in [0.0, 0.3, 3.0] {
         let mut coarser = None;
         for substep_s in [4e-4, 1e-4] {
-            let mut plant = over_edges(Friction { sliding, torsion_m: 0.002 }, substep_s, 0.0);
+            let mut plant = scene(Friction { sliding, torsion_m: 0.002 }, substep_s, 0.0);
             let stored_j = |plant: &Plant| plant.kinetic_energy_j() + plant.elastic_energy_j();
             let (mut at_start_j, mut off_j, mut exchanged_j) = (None, 0.0f64, 0.0f64);
-            plant.run(&[], 0.12, |plant| {
-                let balance_j = stored_j(plant) + plant.flows().dissipated();
+            plant.run(torques_nm, time_s, |plant| {
+                let flows = plant.flows();
+                let balance_j = stored_j(plant) + flows.dissipated() - flows.motors - flows.weight;
                 off_j = (balance_j - *at_start_j.get_or_insert(balance_j)).abs();
                 exchanged_j = exchanged_j.max(plant.elastic_energy_j() + plant.flows().dissipated());
             });
             println!("friction {sliding}, step {substep_s}: {off_j:.1e} J of {exchanged_j:.1e} J");
             assert!(off_j < 1e-3 * exchanged_j);
-            assert!(coarser.is_none_or(|coarser| coarser > 10.0 * off_j));
+            assert!(coarser.is_none_or(|coarser| coarser > falls * off_j));
             coarser = Some(off_j);
         }
     }
@@ -210,7 +262,7 @@ fn slip_that_turns_round_is_of_first_order() {
         let (sine, _) = (60.0 * t_s).sine_cosine();
         Vector3::new(0.8 * sine, 0.0, -1.0) * GRAVITY_M_S2
     });
-    assert!(order("slip turns round", 0.3, &[], &on_table(resting(), 0.2, gravity, 1.0)) > 0.9);
+    assert!(order("slip turns round", 6, 0.3, &[], &on_table(resting(), 0.2, gravity, 1.0)) > 0.9);
 }
 
 /// After a cube has slid to rest, the forces of friction stay what they are.

@@ -1,8 +1,18 @@
 //! Random scenes: nothing panics, diverges, hangs, or makes energy.
 
 use super::*;
-use blindgrasp_body::Push;
-use blindgrasp_meshes::Numbers;
+use blindgrasp_body::polyhedron::Flatness;
+use blindgrasp_body::{Capsule, Push};
+use blindgrasp_meshes::{Numbers, bracket, pit, plate, valley};
+
+/// The objects of random scenes.
+#[derive(Clone, Copy)]
+enum Kind {
+    /// Convex; of the hand, fingertips alone touch.
+    Convex,
+    /// With concave edges, tunnels and pits; links touch as well.
+    Crooked,
+}
 
 /// A number between two, its logarithm evenly spread.
 fn spread(numbers: &mut Numbers, least: f64, most: f64) -> f64 {
@@ -21,10 +31,10 @@ fn friction(numbers: &mut Numbers) -> Friction {
 }
 
 /// A scene in which nothing is deep inside something else at the start, with a share of its step.
-fn scene(numbers: &mut Numbers, share: f64) -> (Plant, Vec<f64>) {
+fn scene(numbers: &mut Numbers, share: f64, kind: Kind) -> (Plant, Vec<f64>) {
     loop {
-        let (mut plant, torques_nm) = any_scene(numbers, share);
-        plant.collect();
+        let (mut plant, torques_nm) = any_scene(numbers, share, kind);
+        plant.collect(&mut Everything::ZERO.clone());
         if plant.touches.iter().all(|touch| touch.depth_m < 1e-3) {
             return (plant, torques_nm);
         }
@@ -32,7 +42,7 @@ fn scene(numbers: &mut Numbers, share: f64) -> (Plant, Vec<f64>) {
 }
 
 /// An object, up to two tables of which one may move, up to five arms that push at it, and pushes from outside.
-fn any_scene(numbers: &mut Numbers, share: f64) -> (Plant, Vec<f64>) {
+fn any_scene(numbers: &mut Numbers, share: f64, kind: Kind) -> (Plant, Vec<f64>) {
     let size_m = spread(numbers, 0.01, 0.1);
     let shape = match numbers.below(4) {
         0 => Polyhedron::cuboid([size_m, size_m * (0.2 + numbers.unit()), size_m * (0.2 + numbers.unit())]),
@@ -42,7 +52,15 @@ fn any_scene(numbers: &mut Numbers, share: f64) -> (Plant, Vec<f64>) {
             &(0..4 + numbers.below(12)).map(|_| numbers.vector() * size_m).collect::<Vec<_>>(),
         ),
     };
-    let shape = shape.unwrap_or_else(|_| Polyhedron::cuboid([size_m; 3]).unwrap());
+    let mut shape = shape.unwrap_or_else(|_| Polyhedron::cuboid([size_m; 3]).unwrap());
+    if let Kind::Crooked = kind {
+        let (mut vertices, triangles) = [bracket, plate, pit, valley][numbers.below(4)]();
+        for vertex in &mut vertices {
+            *vertex *= size_m / 0.05;
+        }
+        let flatness = Flatness { angle_rad: 1e-3, distance_m: 1e-6 };
+        shape = Polyhedron::mesh(&vertices, &triangles, &flatness).unwrap();
+    }
     let radius_m = shape.radius_m();
     let object = object(shape, spread(numbers, 1e-3, 10.0));
     let fingers = 2 + numbers.below(4);
@@ -72,11 +90,22 @@ fn any_scene(numbers: &mut Numbers, share: f64) -> (Plant, Vec<f64>) {
         wall.point_m = Path::new(move |t_s| far_m + moves * (20.0 * t_s).sine_cosine().0);
         tables.push(wall);
     }
-    let world = World {
+    let mut world = World {
         fingertip_friction: (0..fingers).map(|_| friction(numbers)).collect(),
         tables,
         ..World::default()
     };
+    if let Kind::Crooked = kind {
+        // Arms up to their fingertips, and a ball in their middle.
+        for (link, (_, arm_m)) in arms.iter().enumerate() {
+            let ends_m = [arm_m * 0.5, *arm_m]
+                .map(|end_m| model.hand.prepared_joints()[link].from_link.tr_mul(&end_m));
+            world.capsules.push(Capsule { link: Some(link), ends_m, radius_m: 0.008 });
+        }
+        let ends_m = [numbers.vector() * 2.0 * radius_m; 2];
+        world.capsules.push(Capsule { link: None, ends_m, radius_m: 0.01 });
+        world.capsule_friction = world.capsules.iter().map(|_| friction(numbers).sliding).collect();
+    }
     model.joint_limits = numbers.below(2) == 0;
     model.rotor_inertia_kg_m2 = if numbers.below(2) == 0 { vec![] } else { vec![3e-5; fingers] };
     let mut start = at(Vector3::zeros());
@@ -107,11 +136,11 @@ fn gained(seed: u64, plant: &mut Plant, torques_nm: &[f64]) -> f64 {
 
 /// Tolerances: 1 % of the energy; where a light object between hard fingertips is more than a step of up to 1 ms resolves,
 /// half of it or less at a quarter of the step. Solutions that did not converge: one in a thousand, all of them jammed.
-fn run_scenes(seeds: std::ops::Range<u64>) {
+fn run_scenes(seeds: std::ops::Range<u64>, kind: Kind) {
     let mut total = Counters::default();
     let mut most = (0.0, 0);
     for seed in seeds {
-        let (mut plant, torques_nm) = scene(&mut Numbers(seed), 1.0);
+        let (mut plant, torques_nm) = scene(&mut Numbers(seed), 1.0, kind);
         let gain = gained(seed, &mut plant, &torques_nm);
         let counters = plant.counters();
         total.steps += counters.steps;
@@ -122,7 +151,7 @@ fn run_scenes(seeds: std::ops::Range<u64>) {
         total.unconverged += counters.unconverged;
         total.projections += counters.projections;
         if gain > 0.01 {
-            let (mut plant, torques_nm) = scene(&mut Numbers(seed), 0.25);
+            let (mut plant, torques_nm) = scene(&mut Numbers(seed), 0.25, kind);
             let finer = gained(seed, &mut plant, &torques_nm);
             println!("scene {seed}: {gain:.1e} gained, {finer:.1e} at a quarter of the step");
             assert!(finer < 0.5 * gain);
@@ -137,11 +166,13 @@ fn run_scenes(seeds: std::ops::Range<u64>) {
 
 #[test]
 fn a_hundred_random_scenes() {
-    run_scenes(0..100);
+    run_scenes(0..100, Kind::Convex);
+    run_scenes(0..100, Kind::Crooked);
 }
 
 #[test]
 #[ignore = "takes a minute"]
 fn two_thousand_random_scenes() {
-    run_scenes(0..2000);
+    run_scenes(0..2000, Kind::Convex);
+    run_scenes(0..2000, Kind::Crooked);
 }

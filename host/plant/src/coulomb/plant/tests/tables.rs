@@ -158,7 +158,7 @@ fn a_flat_landing_makes_no_energy() {
             let model = model(no_hand(), cube(MASS_KG));
             let start = at(Vector3::new(0.0, 0.0, 0.5 * SIDE_M + height_m));
             let mut plant = Plant::new(model, world(2, vec![table(0.5)]), start, 5e-4).unwrap();
-            plant.materials.corner.damping[0] *= damping;
+            plant.surfaces.materials.corner.damping[0] *= damping;
             let [gained, lost] = imbalance(&mut plant, 0.2);
             println!("damping {damping}, from {height_m} m: {gained:.1e} gained, {lost:.1e} lost");
             assert!(gained < 1e-12 && lost < 1e-12);
@@ -180,7 +180,7 @@ fn a_landing_on_a_corner_makes_no_energy() {
         start.attitude = UnitQuaternion::from_scaled_axis(Vector3::new(0.3, 0.5, 0.1));
         start.spin_rad_s = Vector3::new(3.0, -2.0, 4.0);
         let mut plant = Plant::new(model, world(2, vec![table(0.3)]), start, substep_s).unwrap();
-        plant.materials.corner = material;
+        plant.surfaces.materials.corner = material;
         let [gained, lost] = imbalance(&mut plant, 0.3);
         println!("step {substep_s}: {gained:.1e} gained, {lost:.1e} lost {:?}", plant.counters());
         assert!(gained < 1e-12 && lost < 1e-5);
@@ -204,7 +204,7 @@ fn it_rebounds_the_same_in_every_phase_of_the_step() {
             at(Vector3::new(0.0, 0.0, 0.5 * SIDE_M + 0.001 + SPEED_M_S * 1e-3 * f64::from(phase) / 16.0));
         start.velocity_m_s.z = -SPEED_M_S;
         let mut plant = Plant::new(model, world(2, vec![table(0.5)]), start, 1e-3).unwrap();
-        plant.materials.corner.damping[0] = 0.0;
+        plant.surfaces.materials.corner.damping[0] = 0.0;
         plant.run(&[], 0.1, |_| {});
         let share = plant.motion().velocity_m_s.z / SPEED_M_S;
         (least, most) = (least.min(share), most.max(share));

@@ -1,0 +1,290 @@
+//! Contacts of links and palm, which are capsules: with the object, with tables, and of the hand with itself.
+//!
+//! A capsule feels the object at the point of its line that is closest, and at its farther end: the energy is that of the one and
+//! the other. Lying on a face it feels both its ends; across an edge only the point there; and as the closest point
+//! comes to an end, that end takes over. So forces don't jump, and a link on a face does not rock.
+//!
+//! Most of the hand is far from everything most of the time. Nothing is measured that can't have come near since it last was.
+
+use super::material::Material;
+use super::placed::Placed;
+use super::stiffness::{hard, yields_per_kg};
+use super::touch::{Pair, Touch};
+use super::world::{Friction, World};
+use crate::mass::MassFactor;
+use crate::model::PlantModel;
+use crate::vectors::Everything;
+use blindgrasp_body::polyhedron::{Closest, Touchable};
+use blindgrasp_body::{FingertipModel, MAX_JOINTS, Part, closest_of_lines, pairs};
+use blindgrasp_shared::math::{Real, norm};
+use nalgebra::Vector3;
+
+/// Gap beyond what velocities close in two steps that a contact may have and still be looked at, m.
+const NEAR_M: f64 = 2e-4;
+/// Gap up to which a pair stays among those that are looked at each step, m.
+const STAYS_M: f64 = 1e-3;
+
+/// What a part of the hand may meet.
+#[derive(Clone, Copy, Debug)]
+enum Meeting {
+    /// A capsule and the object.
+    Object(usize),
+    /// A capsule and a table.
+    Table(usize, usize),
+    /// Two parts.
+    Parts([Part; 2]),
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Contact {
+    meeting: Meeting,
+    material: Material,
+    friction: Friction,
+}
+
+/// All contacts that parts of a hand may have.
+#[derive(Clone, Debug)]
+pub(super) struct Links {
+    contacts: Vec<Contact>,
+    /// Those that are near.
+    near: Vec<usize>,
+    /// The least gap of all others, m, less the ways gone since it was measured.
+    gap_m: f64,
+    /// The farthest that a joint moves a point of the hand when it turns, m/rad.
+    reach_m: [f64; MAX_JOINTS],
+}
+
+impl Links {
+    /// Of a hand at its place at the start, with its factored mass matrix.
+    pub(super) fn new(
+        (model, world): (&PlantModel, &World),
+        placed: &Placed,
+        mass: &MassFactor,
+        object_yields_per_kg: f64,
+        step_s: f64,
+    ) -> Self {
+        let (hand, capsules) = (&model.hand, &world.capsules);
+        let yields = |part: Part| {
+            part.link(hand, capsules).map_or(0.0, |link| {
+                let ends_m = part.ends_m(&placed.posture, capsules);
+                ends_m.iter().map(|end_m| yields_per_kg(mass, placed, hand, link, end_m)).fold(0.0, f64::max)
+            })
+        };
+        let mut contacts = Vec::new();
+        for (capsule, &sliding) in world.capsule_friction.iter().enumerate() {
+            let own = yields(Part::Capsule(capsule));
+            contacts.push(Contact {
+                meeting: Meeting::Object(capsule),
+                material: hard(own + object_yields_per_kg, step_s),
+                friction: Friction { sliding, torsion_m: 0.0 },
+            });
+            // Where no joint moves a capsule, a table can't come to it with any force.
+            if capsules[capsule].link.is_none() {
+                continue;
+            }
+            for (t, table) in world.tables.iter().enumerate() {
+                contacts.push(Contact {
+                    meeting: Meeting::Table(capsule, t),
+                    material: hard(own, step_s),
+                    friction: Friction { sliding: table.object_friction, torsion_m: 0.0 },
+                });
+            }
+        }
+        for parts in pairs(hand, capsules) {
+            let sliding = parts.map(|part| match part {
+                Part::Capsule(capsule) => world.capsule_friction[capsule],
+                Part::Fingertip(finger) => world.fingertip_friction[finger].sliding,
+            });
+            let material = match parts {
+                [Part::Fingertip(first), Part::Fingertip(second)] => {
+                    between(&model.fingertips[first], &model.fingertips[second])
+                }
+                [Part::Fingertip(soft), Part::Capsule(_)] | [Part::Capsule(_), Part::Fingertip(soft)] => {
+                    Material::of_fingertip(&model.fingertips[soft])
+                }
+                _ => hard(parts.into_iter().map(yields).sum(), step_s),
+            };
+            let friction = Friction { sliding: sliding[0].min(sliding[1]), torsion_m: 0.0 };
+            contacts.push(Contact { meeting: Meeting::Parts(parts), material, friction });
+        }
+        Self { contacts, near: Vec::new(), gap_m: 0.0, reach_m: reach_m(model, world) }
+    }
+
+    /// Looks again at what may be near after half-step velocities have moved everything for a step.
+    pub(super) fn update(
+        &mut self,
+        placed: &Placed,
+        (model, world): (&PlantModel, &World),
+        object: &Touchable,
+        (before, table_m): (&Everything, f64),
+        (t_s, step_s): (f64, f64),
+    ) {
+        if self.contacts.is_empty() {
+            return;
+        }
+        let mut rate_m_s = 0.0;
+        for (speed, reach_m) in before.joints.iter().zip(&self.reach_m) {
+            rate_m_s += 2.0 * speed.magnitude() * reach_m;
+        }
+        let [x, y, z, a, b, c] = before.object;
+        rate_m_s +=
+            norm(&Vector3::new(x, y, z)) + norm(&Vector3::new(a, b, c)) * model.object.shape.radius_m();
+        let moved_m = rate_m_s * step_s + table_m;
+        self.gap_m -= moved_m;
+        let within_m = NEAR_M + 2.0 * moved_m;
+        if self.gap_m > within_m {
+            return;
+        }
+        self.near.clear();
+        self.gap_m = f64::INFINITY;
+        for (k, contact) in self.contacts.iter().enumerate() {
+            let gap_m = gap_m(contact.meeting, placed, (model, world), object, t_s);
+            if gap_m < within_m + STAYS_M {
+                self.near.push(k);
+            } else {
+                self.gap_m = self.gap_m.min(gap_m);
+            }
+        }
+    }
+
+    /// Gives the contacts that are near.
+    pub(super) fn see(
+        &self,
+        placed: &Placed,
+        (model, world): (&PlantModel, &World),
+        object: &Touchable,
+        t_s: f64,
+        mut see: impl FnMut(&Touch),
+    ) {
+        let capsules = &world.capsules;
+        for &k in &self.near {
+            let Contact { meeting, material, friction } = self.contacts[k];
+            let mut see = |touch: Touch| see(&Touch { material, friction, ..touch });
+            match meeting {
+                Meeting::Object(capsule) => {
+                    let radius_m = capsules[capsule].radius_m;
+                    let (ends_m, share, closest) = on_object(capsule, placed, world, object);
+                    let pair = |is_far_end| Pair::CapsuleObject { capsule, is_far_end };
+                    see(placed.onto_object(pair(false), radius_m, &closest));
+                    let others = ends_m.iter().zip([0.0, 1.0]).filter(|(_, end)| *end != share);
+                    let far = others
+                        .map(|(end_m, _)| object.closest(end_m))
+                        .max_by(|a, b| a.distance_m.total_cmp(&b.distance_m));
+                    if let Some(far) = far {
+                        see(placed.onto_object(pair(true), radius_m, &far));
+                    }
+                }
+                Meeting::Table(capsule, table) => {
+                    let (normal, origin_m) =
+                        (world.tables[table].normal, world.tables[table].point_m.at(t_s));
+                    let ends_m = Part::Capsule(capsule).ends_m(&placed.posture, capsules);
+                    for (end, end_m) in ends_m.iter().enumerate() {
+                        let height_m = normal.dot(&(end_m - origin_m));
+                        let pair = Pair::CapsuleTable { capsule, table, end };
+                        let depth_m = capsules[capsule].radius_m - height_m;
+                        see(Touch::new(pair, depth_m, end_m - normal * height_m, -normal));
+                    }
+                }
+                Meeting::Parts(parts) => {
+                    let [first, second] = parts;
+                    let lines = parts.map(|part| part.ends_m(&placed.posture, capsules));
+                    let shares = closest_of_lines([&lines[0], &lines[1]]);
+                    let at = |k: usize| lines[k][0] + (lines[k][1] - lines[k][0]) * shares[k];
+                    let [near, far] = [at(0), at(1)];
+                    let distance_m = norm(&(far - near));
+                    let normal = if distance_m > 0.0 { (far - near) / distance_m } else { Vector3::z() };
+                    let [a, b] = parts.map(|part| part.radius_m(&model.hand, capsules));
+                    let depth_m = a + b - distance_m;
+                    let point_m = near + normal * (a - 0.5 * depth_m);
+                    see(Touch::new(Pair::Parts { first, second }, depth_m, point_m, normal));
+                }
+            }
+        }
+    }
+}
+
+/// Ends of a capsule's line in the object frame, the share of it where it is closest to the object, and the closest point of that.
+fn on_object(
+    capsule: usize,
+    placed: &Placed,
+    world: &World,
+    object: &Touchable,
+) -> ([Vector3<f64>; 2], f64, Closest) {
+    let ends_m = Part::Capsule(capsule).ends_m(&placed.posture, &world.capsules);
+    let ends_m = ends_m.map(|end_m| placed.to_object(&end_m));
+    let (share, closest) = object.closest_to_line(&ends_m);
+    (ends_m, share, closest)
+}
+
+/// The gap of a pair, m, or somewhat less.
+fn gap_m(
+    meeting: Meeting,
+    placed: &Placed,
+    (model, world): (&PlantModel, &World),
+    object: &Touchable,
+    t_s: f64,
+) -> f64 {
+    let capsules = &world.capsules;
+    match meeting {
+        Meeting::Object(capsule) => {
+            let radius_m = capsules[capsule].radius_m;
+            // From the ball around the object, where that is far enough.
+            let ends_m = Part::Capsule(capsule).ends_m(&placed.posture, capsules);
+            let centre = [placed.position_m; 2];
+            let [share, _] = closest_of_lines([&ends_m, &centre]);
+            let apart_m = norm(&(ends_m[0] + (ends_m[1] - ends_m[0]) * share - placed.position_m));
+            let outside_m = apart_m - model.object.shape.radius_m() - radius_m;
+            if outside_m > 10.0 * STAYS_M {
+                outside_m
+            } else {
+                on_object(capsule, placed, world, object).2.distance_m - radius_m
+            }
+        }
+        Meeting::Table(capsule, table) => {
+            let table = &world.tables[table];
+            let ends_m = Part::Capsule(capsule).ends_m(&placed.posture, capsules);
+            let heights_m = ends_m.map(|end_m| table.normal.dot(&(end_m - table.point_m.at(t_s))));
+            heights_m[0].min(heights_m[1]) - capsules[capsule].radius_m
+        }
+        Meeting::Parts(parts) => {
+            let lines = parts.map(|part| part.ends_m(&placed.posture, capsules));
+            let shares = closest_of_lines([&lines[0], &lines[1]]);
+            let at = |k: usize| lines[k][0] + (lines[k][1] - lines[k][0]) * shares[k];
+            let radii_m: f64 = parts.map(|part| part.radius_m(&model.hand, capsules)).iter().sum();
+            norm(&(at(0) - at(1))) - radii_m
+        }
+    }
+}
+
+/// Two fingertips against each other: each gives way by its own law, and the forces are the same.
+fn between(first: &FingertipModel, second: &FingertipModel) -> Material {
+    // f = k1 d1^2 = k2 d2^2 and d = d1 + d2 make f = k d^2 with 1 / sqrt(k) the sum of both.
+    let root = |tip: &FingertipModel| 1.0 / tip.stiffness_n_m2.square_root();
+    let sum = root(first) + root(second);
+    Material::of_fingertip(&FingertipModel {
+        radius_m: first.radius_m.min(second.radius_m),
+        stiffness_n_m2: 1.0 / (sum * sum),
+        damping_n_s_m3: 1.0 / (1.0 / first.damping_n_s_m3 + 1.0 / second.damping_n_s_m3),
+        torsion_n_s_m: 0.0,
+    })
+}
+
+/// The farthest from each joint that a point of the hand can be that it moves, m.
+fn reach_m(model: &PlantModel, world: &World) -> [f64; MAX_JOINTS] {
+    let hand = &model.hand;
+    let mut reach_m = [0.0; MAX_JOINTS];
+    let tips = hand.prepared_fingertips().iter().map(|tip| (tip.link, norm(&tip.offset_m) + tip.radius_m));
+    let capsules = world.capsules.iter().filter_map(|capsule| {
+        let farthest_m = capsule.ends_m.iter().map(norm).fold(0.0, f64::max);
+        Some((capsule.link?, farthest_m + capsule.radius_m))
+    });
+    for (link, mut far_m) in tips.chain(capsules) {
+        let mut at = Some(link);
+        while let Some(joint) = at {
+            reach_m[joint] = f64::max(reach_m[joint], far_m);
+            far_m += norm(&hand.offset_m(joint));
+            at = hand.parent(joint);
+        }
+    }
+    reach_m
+}
