@@ -65,6 +65,21 @@ impl Convex {
         Some(Self { sides: sides.collect() })
     }
 
+    /// The part of a line that is inside, by shares of the line.
+    pub(super) fn inside(&self, ends_m: &[Vector3<f64>; 2]) -> Option<[f64; 2]> {
+        let (mut low, mut high) = (0.0, 1.0);
+        for side in &self.sides {
+            let [from_m, to_m] = ends_m.map(|end_m| side.normal.dot(&end_m) - side.distance_m);
+            match (from_m > 0.0, to_m > 0.0) {
+                (true, true) => return None,
+                (true, false) => low = f64::max(low, from_m / (from_m - to_m)),
+                (false, true) => high = f64::min(high, from_m / (from_m - to_m)),
+                (false, false) => {}
+            }
+        }
+        (low < high).then_some([low, high])
+    }
+
     /// Returns the point of the surface that is closest to a point.
     pub(super) fn closest(&self, point_m: &Vector3<f64>) -> Closest {
         let height_m = |side: &Side| side.normal.dot(point_m) - side.distance_m;

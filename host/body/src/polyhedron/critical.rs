@@ -11,10 +11,14 @@
 //!   edge and foot meet and cancel. Forces never jump, and a face feels the same whatever it borders on.
 
 use super::{Closest, Face, Polyhedron};
+use crate::closest_of_lines;
 use blindgrasp_shared::math::norm;
 use nalgebra::Vector3;
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;
+
+/// Error of directions, rad.
+const ROUNDING: f64 = 1e-12;
 
 /// A place where a sphere touches.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -205,6 +209,52 @@ impl Features {
             place: Closest { point_m: *point_m, normal: Vector3::z(), distance_m: 0.0 },
             index: 1,
         })
+    }
+
+    /// Gives the places inside of a line, by its share, where it passes an edge or a vertex that is turned to it.
+    pub(super) fn in_front_of(&self, ends_m: &[Vector3<f64>; 2], mut see: impl FnMut(f64)) {
+        let along_m = ends_m[1] - ends_m[0];
+        let is_within = |share: f64| share > 0.0 && share < 1.0;
+        for edge in self.edges.iter().filter(|edge| !edge.is_concave) {
+            let to_m = edge.from_m + edge.along * edge.length_m;
+            let [share, on_edge] = closest_of_lines([ends_m, &[edge.from_m, to_m]]);
+            if is_within(share) && is_within(on_edge) {
+                let away_m = ends_m[0] + along_m * share - edge.from_m;
+                if edge.outwards.dot(&away_m) > 0.0 {
+                    see(share);
+                }
+            }
+        }
+        for corner in &self.corners {
+            let [share, _] = closest_of_lines([ends_m, &[corner.at_m; 2]]);
+            let away_m = ends_m[0] + along_m * share - corner.at_m;
+            // Where an edge leads nearer to the line, it is the edge that is in front of it. Along an edge, both its ends are.
+            let leads_nearer = |&(number, ends_here): &(usize, bool)| {
+                let along_m = self.edges[number].along.dot(&away_m);
+                if ends_here { -along_m } else { along_m }
+            };
+            let none_m = ROUNDING * norm(&away_m);
+            if is_within(share) && corner.rays.iter().all(|ray| leads_nearer(ray) <= none_m) {
+                see(share);
+            }
+        }
+    }
+
+    /// A part of a line that is inside the body, by shares of the line: up to where it crosses the surface next.
+    pub(super) fn inside(&self, ends_m: &[Vector3<f64>; 2]) -> Option<[f64; 2]> {
+        let along_m = ends_m[1] - ends_m[0];
+        let crossing = |face: &Face| {
+            let [from_m, to_m] = ends_m.map(|end_m| face.normal.dot(&end_m) - face.distance_m);
+            let share = from_m / (from_m - to_m);
+            ((from_m > 0.0) != (to_m > 0.0)
+                && face.margin_m(&self.vertices_m, &(ends_m[0] + along_m * share)) > 0.0)
+                .then_some(share)
+        };
+        let mut shares: Vec<f64> = self.faces.iter().filter_map(crossing).collect();
+        shares.sort_by(f64::total_cmp);
+        let first = *shares.first()?;
+        let begins_inside = self.see(&ends_m[0], 0.0, |_| ()).place.distance_m < 0.0;
+        Some(if begins_inside { [0.0, first] } else { [first, shares.get(1).copied().unwrap_or(1.0)] })
     }
 
     /// A point of an edge or a vertex, seen from a point that is so far away.

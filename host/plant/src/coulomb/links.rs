@@ -1,8 +1,7 @@
 //! Contacts of links and palm, which are capsules: with the object, with tables, and of the hand with itself.
 //!
-//! A capsule feels the object at the point of its line that is closest, and at its farther end: the energy is that of the one and
-//! the other. Lying on a face it feels both its ends; across an edge only the point there; and as the closest point
-//! comes to an end, that end takes over. So forces don't jump, and a link on a face does not rock.
+//! A capsule feels the object at the two places at which its line would lie on it: of its own ends, and of where it passes the
+//! object's edges, the closest two. So forces don't jump, and what lies on a link does not rock.
 //!
 //! Most of the hand is far from everything most of the time. Nothing is measured that can't have come near since it last was.
 
@@ -14,7 +13,7 @@ use super::world::{Friction, World};
 use crate::mass::MassFactor;
 use crate::model::PlantModel;
 use crate::vectors::Everything;
-use blindgrasp_body::polyhedron::{Closest, Touchable};
+use blindgrasp_body::polyhedron::{Support, Touchable};
 use blindgrasp_body::{FingertipModel, MAX_JOINTS, Part, closest_of_lines, pairs};
 use blindgrasp_shared::math::{Real, norm};
 use nalgebra::Vector3;
@@ -110,6 +109,12 @@ impl Links {
         Self { contacts, near: Vec::new(), gap_m: 0.0, reach_m: reach_m(model, world) }
     }
 
+    /// Forgets what is far.
+    #[cfg(test)]
+    pub(super) fn forget(&mut self) {
+        self.gap_m = 0.0;
+    }
+
     /// Looks again at what may be near after half-step velocities have moved everything for a step.
     pub(super) fn update(
         &mut self,
@@ -163,15 +168,10 @@ impl Links {
             match meeting {
                 Meeting::Object(capsule) => {
                     let radius_m = capsules[capsule].radius_m;
-                    let (ends_m, share, closest) = on_object(capsule, placed, world, object);
-                    let pair = |is_far_end| Pair::CapsuleObject { capsule, is_far_end };
-                    see(placed.onto_object(pair(false), radius_m, &closest));
-                    let others = ends_m.iter().zip([0.0, 1.0]).filter(|(_, end)| *end != share);
-                    let far = others
-                        .map(|(end_m, _)| object.closest(end_m))
-                        .max_by(|a, b| a.distance_m.total_cmp(&b.distance_m));
-                    if let Some(far) = far {
-                        see(placed.onto_object(pair(true), radius_m, &far));
+                    let supports = on_object(capsule, placed, world, object);
+                    for (support, is_second) in supports.iter().zip([false, true]) {
+                        let pair = Pair::CapsuleObject { capsule, is_second };
+                        see(placed.onto_object(pair, radius_m, &support.closest));
                     }
                 }
                 Meeting::Table(capsule, table) => {
@@ -203,17 +203,10 @@ impl Links {
     }
 }
 
-/// Ends of a capsule's line in the object frame, the share of it where it is closest to the object, and the closest point of that.
-fn on_object(
-    capsule: usize,
-    placed: &Placed,
-    world: &World,
-    object: &Touchable,
-) -> ([Vector3<f64>; 2], f64, Closest) {
+/// The places at which a capsule's line would lie on the object.
+fn on_object(capsule: usize, placed: &Placed, world: &World, object: &Touchable) -> [Support; 2] {
     let ends_m = Part::Capsule(capsule).ends_m(&placed.posture, &world.capsules);
-    let ends_m = ends_m.map(|end_m| placed.to_object(&end_m));
-    let (share, closest) = object.closest_to_line(&ends_m);
-    (ends_m, share, closest)
+    object.supports(&ends_m.map(|end_m| placed.to_object(&end_m)))
 }
 
 /// The gap of a pair, m, or somewhat less.
@@ -237,7 +230,7 @@ fn gap_m(
             if outside_m > 10.0 * STAYS_M {
                 outside_m
             } else {
-                on_object(capsule, placed, world, object).2.distance_m - radius_m
+                on_object(capsule, placed, world, object)[0].closest.distance_m - radius_m
             }
         }
         Meeting::Table(capsule, table) => {

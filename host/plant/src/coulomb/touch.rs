@@ -38,8 +38,8 @@ pub enum Pair {
     CapsuleObject {
         /// The capsule.
         capsule: usize,
-        /// Its end that is farther from the object; else its point that is closest.
-        is_far_end: bool,
+        /// The second of the two places at which it lies on the object.
+        is_second: bool,
     },
     /// An end of a capsule and a table.
     CapsuleTable {

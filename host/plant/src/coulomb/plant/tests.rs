@@ -2,6 +2,7 @@
 
 mod grasps;
 mod joints;
+mod links;
 mod order;
 mod robustness;
 mod tables;

@@ -7,7 +7,7 @@ use blindgrasp_meshes::{Numbers, bracket, pit, plate, valley};
 
 /// The objects of random scenes.
 #[derive(Clone, Copy)]
-enum Kind {
+pub(super) enum Kind {
     /// Convex; of the hand, fingertips alone touch.
     Convex,
     /// With concave edges, tunnels and pits; links touch as well.
@@ -31,7 +31,7 @@ fn friction(numbers: &mut Numbers) -> Friction {
 }
 
 /// A scene in which nothing is deep inside something else at the start, with a share of its step.
-fn scene(numbers: &mut Numbers, share: f64, kind: Kind) -> (Plant, Vec<f64>) {
+pub(super) fn scene(numbers: &mut Numbers, share: f64, kind: Kind) -> (Plant, Vec<f64>) {
     loop {
         let (mut plant, torques_nm) = any_scene(numbers, share, kind);
         plant.collect(&mut Everything::ZERO.clone());
