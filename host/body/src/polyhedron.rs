@@ -32,7 +32,7 @@ pub use critical::Critical;
 pub use error::counted;
 pub use error::{MeshFault, PolyhedronError};
 pub use mesh::{MAX_TRIANGLES, bounds_m, diagonal_m};
-pub use touchable::{Support, Touchable};
+pub use touchable::Touchable;
 
 use blindgrasp_shared::math::norm;
 use nalgebra::{Matrix3, Vector3};

@@ -212,23 +212,21 @@ impl Features {
     }
 
     /// Gives the places inside of a line, by its share, where it passes an edge or a vertex that is turned to it.
-    pub(super) fn in_front_of(&self, ends_m: &[Vector3<f64>; 2], mut see: impl FnMut(f64)) {
+    pub(super) fn passes(&self, ends_m: &[Vector3<f64>; 2], mut see: impl FnMut(f64)) {
         let along_m = ends_m[1] - ends_m[0];
         let is_within = |share: f64| share > 0.0 && share < 1.0;
         for edge in self.edges.iter().filter(|edge| !edge.is_concave) {
             let to_m = edge.from_m + edge.along * edge.length_m;
             let [share, on_edge] = closest_of_lines([ends_m, &[edge.from_m, to_m]]);
-            if is_within(share) && is_within(on_edge) {
-                let away_m = ends_m[0] + along_m * share - edge.from_m;
-                if edge.outwards.dot(&away_m) > 0.0 {
-                    see(share);
-                }
+            let away_m = ends_m[0] + along_m * share - edge.from_m;
+            if is_within(share) && is_within(on_edge) && edge.outwards.dot(&away_m) > 0.0 {
+                see(share);
             }
         }
         for corner in &self.corners {
             let [share, _] = closest_of_lines([ends_m, &[corner.at_m; 2]]);
             let away_m = ends_m[0] + along_m * share - corner.at_m;
-            // Where an edge leads nearer to the line, it is the edge that is in front of it. Along an edge, both its ends are.
+            // Where an edge leads nearer to the line, it is the edge that it passes. Along an edge it passes both ends.
             let leads_nearer = |&(number, ends_here): &(usize, bool)| {
                 let along_m = self.edges[number].along.dot(&away_m);
                 if ends_here { -along_m } else { along_m }

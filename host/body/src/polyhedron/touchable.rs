@@ -3,6 +3,7 @@
 use super::Polyhedron;
 use super::convex::{Closest, Convex};
 use super::critical::{Critical, Features};
+use blindgrasp_shared::math::norm;
 use nalgebra::Vector3;
 
 /// A polyhedron's surface. A convex body has a quicker way.
@@ -10,15 +11,6 @@ use nalgebra::Vector3;
 pub struct Touchable {
     features: Features,
     convex: Option<Convex>,
-}
-
-/// A place of a line that lies on a body, or would if it came nearer.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Support {
-    /// Its share of the line, from 0 to 1.
-    pub share: f64,
-    /// The point of the surface that is closest to it.
-    pub closest: Closest,
 }
 
 impl Touchable {
@@ -57,28 +49,47 @@ impl Touchable {
         }
     }
 
-    /// The two places at which a line would lie on the body: the closest of all, then the next of those that may be: its own ends, and
-    /// where it passes the body's edges and vertices. Where it pierces the surface, the middle of what is inside is the first.
-    pub fn supports(&self, ends_m: &[Vector3<f64>; 2]) -> [Support; 2] {
-        let along_m = ends_m[1] - ends_m[0];
-        let at = |share: f64| Support { share, closest: self.closest(&(ends_m[0] + along_m * share)) };
-        let [mut first, mut second] = [at(0.0), at(1.0)];
-        if second.closest.distance_m < first.closest.distance_m {
-            (first, second) = (second, first);
-        }
-        let mut consider = |support: Support| {
-            if support.closest.distance_m < first.closest.distance_m {
-                (second, first) = (first, support);
-            } else if support.closest.distance_m < second.closest.distance_m {
-                second = support;
+    /// Returns how far along a line (0 to 1) the point is that is closest to the surface, and the closest point of that. Where the
+    /// line pierces the surface, it is the middle of a part that is inside.
+    pub fn closest_to_line(&self, ends_m: &[Vector3<f64>; 2]) -> (f64, Closest) {
+        let mut nearest = (0.0, self.closest(&ends_m[0]));
+        self.places_of(ends_m, |share, closest| {
+            if closest.distance_m < nearest.1.distance_m {
+                nearest = (share, closest);
             }
-        };
-        self.features.in_front_of(ends_m, |share| consider(at(share)));
+        });
+        nearest
+    }
+
+    /// The two places at which a rod lies on the body, or would if it came nearer, by shares of its line: of its own ends and of where
+    /// it passes the body's edges and vertices, the closest one and the next. With each the distance, m, from which on it touches. As
+    /// two of them become one, the second's shrinks until it does not touch any more.
+    pub fn supports(&self, ends_m: &[Vector3<f64>; 2], radius_m: f64) -> [(f64, f64); 2] {
+        let (first, _) = self.closest_to_line(ends_m);
+        let length_m = norm(&(ends_m[1] - ends_m[0]));
+        let (mut second, mut deepest_m) = ((first, f64::NEG_INFINITY), f64::NEG_INFINITY);
+        self.places_of(ends_m, |share, closest| {
+            let near = 1.0 - ((share - first).abs() * length_m / radius_m).min(1.0);
+            let within_m = radius_m * (1.0 - near * near);
+            if within_m - closest.distance_m > deepest_m {
+                deepest_m = within_m - closest.distance_m;
+                second = (share, within_m);
+            }
+        });
+        [(first, radius_m), second]
+    }
+
+    /// Gives the places of a line that may be closest to the surface: both ends, those at which it passes edges or vertices, and the
+    /// middle of what pierces the body.
+    fn places_of(&self, ends_m: &[Vector3<f64>; 2], mut see: impl FnMut(f64, Closest)) {
+        let mut see = |share: f64| see(share, self.closest(&(ends_m[0] + (ends_m[1] - ends_m[0]) * share)));
+        see(0.0);
+        see(1.0);
+        self.features.passes(ends_m, &mut see);
         let inside = self.convex.as_ref().map_or_else(|| self.features.inside(ends_m), |c| c.inside(ends_m));
         if let Some([from, to]) = inside {
-            consider(at(0.5 * (from + to)));
+            see(0.5 * (from + to));
         }
-        [first, second]
     }
 }
 

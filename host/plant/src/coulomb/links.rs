@@ -1,7 +1,7 @@
 //! Contacts of links and palm, which are capsules: with the object, with tables, and of the hand with itself.
 //!
-//! A capsule feels the object at the two places at which its line would lie on it: of its own ends, and of where it passes the
-//! object's edges, the closest two. So forces don't jump, and what lies on a link does not rock.
+//! A capsule lies on the object at two places: of its own ends, and of where it passes the object's edges and vertices, the closest
+//! two. So what lies on it does not rock. As they become one, only one is left, and forces don't jump.
 //!
 //! Most of the hand is far from everything most of the time. Nothing is measured that can't have come near since it last was.
 
@@ -13,7 +13,7 @@ use super::world::{Friction, World};
 use crate::mass::MassFactor;
 use crate::model::PlantModel;
 use crate::vectors::Everything;
-use blindgrasp_body::polyhedron::{Support, Touchable};
+use blindgrasp_body::polyhedron::{Critical, Touchable};
 use blindgrasp_body::{FingertipModel, MAX_JOINTS, Part, closest_of_lines, pairs};
 use blindgrasp_shared::math::{Real, norm};
 use nalgebra::Vector3;
@@ -157,21 +157,24 @@ impl Links {
         &self,
         placed: &Placed,
         (model, world): (&PlantModel, &World),
-        object: &Touchable,
-        t_s: f64,
-        mut see: impl FnMut(&Touch),
+        (object, places): (&Touchable, &mut Vec<Critical>),
+        (t_s, within_m): (f64, f64),
+        see: &mut impl FnMut(&Touch),
     ) {
         let capsules = &world.capsules;
         for &k in &self.near {
             let Contact { meeting, material, friction } = self.contacts[k];
-            let mut see = |touch: Touch| see(&Touch { material, friction, ..touch });
+            let mut see_it = |touch: Touch| see(&Touch { material, friction, ..touch });
             match meeting {
                 Meeting::Object(capsule) => {
-                    let radius_m = capsules[capsule].radius_m;
-                    let supports = on_object(capsule, placed, world, object);
-                    for (support, is_second) in supports.iter().zip([false, true]) {
-                        let pair = Pair::CapsuleObject { capsule, is_second };
-                        see(placed.onto_object(pair, radius_m, &support.closest));
+                    let ends_m = Part::Capsule(capsule).ends_m(&placed.posture, capsules);
+                    let ends_m = ends_m.map(|end_m| placed.to_object(&end_m));
+                    let supports = object.supports(&ends_m, capsules[capsule].radius_m);
+                    for ((share, touches_m), is_second) in supports.into_iter().zip([false, true]) {
+                        let centre_m = ends_m[0] + (ends_m[1] - ends_m[0]) * share;
+                        object.touches(&centre_m, touches_m + within_m, places);
+                        let pair = |feature: usize| Pair::CapsuleObject { capsule, is_second, feature };
+                        placed.ball_on_object(pair, touches_m, places, (&material, &friction), &mut *see);
                     }
                 }
                 Meeting::Table(capsule, table) => {
@@ -182,7 +185,7 @@ impl Links {
                         let height_m = normal.dot(&(end_m - origin_m));
                         let pair = Pair::CapsuleTable { capsule, table, end };
                         let depth_m = capsules[capsule].radius_m - height_m;
-                        see(Touch::new(pair, depth_m, end_m - normal * height_m, -normal));
+                        see_it(Touch::new(pair, depth_m, end_m - normal * height_m, -normal));
                     }
                 }
                 Meeting::Parts(parts) => {
@@ -196,17 +199,11 @@ impl Links {
                     let [a, b] = parts.map(|part| part.radius_m(&model.hand, capsules));
                     let depth_m = a + b - distance_m;
                     let point_m = near + normal * (a - 0.5 * depth_m);
-                    see(Touch::new(Pair::Parts { first, second }, depth_m, point_m, normal));
+                    see_it(Touch::new(Pair::Parts { first, second }, depth_m, point_m, normal));
                 }
             }
         }
     }
-}
-
-/// The places at which a capsule's line would lie on the object.
-fn on_object(capsule: usize, placed: &Placed, world: &World, object: &Touchable) -> [Support; 2] {
-    let ends_m = Part::Capsule(capsule).ends_m(&placed.posture, &world.capsules);
-    object.supports(&ends_m.map(|end_m| placed.to_object(&end_m)))
 }
 
 /// The gap of a pair, m, or somewhat less.
@@ -230,7 +227,8 @@ fn gap_m(
             if outside_m > 10.0 * STAYS_M {
                 outside_m
             } else {
-                on_object(capsule, placed, world, object)[0].closest.distance_m - radius_m
+                let ends_m = ends_m.map(|end_m| placed.to_object(&end_m));
+                object.closest_to_line(&ends_m).1.distance_m - radius_m
             }
         }
         Meeting::Table(capsule, table) => {

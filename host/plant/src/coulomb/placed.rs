@@ -24,7 +24,7 @@ pub(super) struct Surfaces {
     pub(super) object: Touchable,
     pub(super) materials: Materials,
     pub(super) links: Links,
-    /// Room for the places where one fingertip touches.
+    /// Room for the places where one ball touches.
     pub(super) places: Vec<Critical>,
 }
 
@@ -84,10 +84,10 @@ impl Placed {
         self.turned.tr_mul(&(point_m - self.position_m))
     }
 
-    /// A sphere of the hand, and the object where it is closest.
-    pub(super) fn onto_object(&self, pair: Pair, radius_m: f64, closest: &Closest) -> Touch {
+    /// A part of the hand that is closer than a distance, and the object where it is closest.
+    pub(super) fn onto_object(&self, pair: Pair, within_m: f64, closest: &Closest) -> Touch {
         let point_m = self.position_m + self.turned * closest.point_m;
-        Touch::new(pair, radius_m - closest.distance_m, point_m, -(self.turned * closest.normal))
+        Touch::new(pair, within_m - closest.distance_m, point_m, -(self.turned * closest.normal))
     }
 
     /// A fingertip and the object, however far they are from each other.
@@ -95,6 +95,27 @@ impl Placed {
         let closest = surface.closest(&self.to_object(&self.posture.centres_m[finger]));
         let pair = Pair::FingertipObject { finger, feature: 0 };
         self.onto_object(pair, model.fingertips[finger].radius_m, &closest)
+    }
+
+    /// Gives the contacts of a ball of the hand with the object, at all places where it touches.
+    pub(super) fn ball_on_object(
+        &self,
+        pair: impl Fn(usize) -> Pair,
+        within_m: f64,
+        places: &[Critical],
+        (material, friction): (&Material, &Friction),
+        mut see: impl FnMut(&Touch),
+    ) {
+        for critical in places {
+            let share = if places.len() == 1 { 1.0 } else { share(critical, places, within_m, material) };
+            let (sliding, torsion_m) = (share * friction.sliding, share * friction.torsion_m);
+            see(&Touch {
+                friction: Friction { sliding, torsion_m },
+                material: material.times(f64::from(critical.index.abs())),
+                is_negative: critical.index < 0,
+                ..self.onto_object(pair(critical.feature), within_m, &critical.place)
+            });
+        }
     }
 
     /// Gives every pair of bodies closer than a distance, with the tables at a time; of parts of the hand those that `links` had
@@ -111,25 +132,12 @@ impl Placed {
         let Surfaces { object, materials, places, links } = surfaces;
         for (finger, material) in materials.fingertips.iter().enumerate() {
             let radius_m = model.fingertips[finger].radius_m;
-            let centre_m = self.to_object(&self.posture.centres_m[finger]);
-            object.touches(&centre_m, radius_m + within_m, places);
-            for critical in places.iter() {
-                let pair = Pair::FingertipObject { finger, feature: critical.feature };
-                let touch = self.onto_object(pair, radius_m, &critical.place);
-                let share = if places.len() == 1 { 1.0 } else { share(critical, places, radius_m, material) };
-                let friction = &world.fingertip_friction[finger];
-                see(&Touch {
-                    friction: Friction {
-                        sliding: share * friction.sliding,
-                        torsion_m: share * friction.torsion_m,
-                    },
-                    material: material.times(f64::from(critical.index.abs())),
-                    is_negative: critical.index < 0,
-                    ..touch
-                });
-            }
+            object.touches(&self.to_object(&self.posture.centres_m[finger]), radius_m + within_m, places);
+            let pair = |feature: usize| Pair::FingertipObject { finger, feature };
+            let friction = &world.fingertip_friction[finger];
+            self.ball_on_object(pair, radius_m, places, (material, friction), &mut see);
         }
-        links.see(self, (model, world), object, t_s, &mut see);
+        links.see(self, (model, world), (object, places), (t_s, within_m), &mut see);
         for (t, table) in world.tables.iter().enumerate() {
             let origin_m = table.point_m.at(t_s);
             let corner = Pair::ObjectTable { corner: 0, table: t };
@@ -230,11 +238,11 @@ fn is_below(hand: &Hand, link: usize, joint: usize) -> bool {
     at == Some(joint)
 }
 
-/// The share of its force for which a place where a fingertip touches has friction. A concave edge takes friction from all, the
+/// The share of its force for which a place where a ball touches has friction. A concave edge takes friction from all, the
 /// more the nearer they are: as one of them comes to the edge to cancel with it, nothing is left of that one's, and all of the
 /// others'.
-fn share(critical: &Critical, places: &[Critical], radius_m: f64, material: &Material) -> f64 {
-    let force_n = |of: &Critical| material.elastic_force_n(radius_m - of.place.distance_m);
+fn share(critical: &Critical, places: &[Critical], within_m: f64, material: &Material) -> f64 {
+    let force_n = |of: &Critical| material.elastic_force_n(within_m - of.place.distance_m);
     let own_n = force_n(critical);
     if critical.index < 0 || !(own_n > 0.0) {
         return f64::from(u8::from(critical.index > 0));

@@ -40,6 +40,8 @@ pub enum Pair {
         capsule: usize,
         /// The second of the two places at which it lies on the object.
         is_second: bool,
+        /// As of a fingertip.
+        feature: usize,
     },
     /// An end of a capsule and a table.
     CapsuleTable {

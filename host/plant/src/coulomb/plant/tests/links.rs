@@ -143,7 +143,7 @@ fn nothing_near_is_overlooked() {
     let mut touched = 0;
     for seed in 0..60 {
         let path = |everything: bool| {
-            let (mut plant, torques) = scene(&mut Numbers(seed), 1.0, Kind::Crooked);
+            let (mut plant, torques) = scene(&mut Numbers(seed), 1.0, Kind::Links);
             let mut torques_nm = [0.0; MAX_JOINTS];
             torques_nm[..torques.len()].copy_from_slice(&torques);
             let mut seen = 0;
