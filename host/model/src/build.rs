@@ -55,6 +55,7 @@ pub(super) fn scene(file: SceneFile) -> Result<Scene> {
     world::sinking(&file.plant, object.mass_kg, &mut warnings);
     overlaps(&file.hand, &hand, &start.angles_rad, &mut warnings);
 
+    let capsules = if file.plant.links_touch() { file.hand.capsules(&hand) } else { Vec::new() };
     Ok(Scene {
         name: file.name.clone(),
         description: file.description.clone(),
@@ -64,6 +65,8 @@ pub(super) fn scene(file: SceneFile) -> Result<Scene> {
         joints: file.hand.joints.iter().map(|joint| joint_parameters(joint, &file)).collect(),
         fingertips: file.hand.fingertips.iter().map(fingertip_parameters).collect(),
         fingertip_friction: world::frictions(&file),
+        capsules,
+        capsule_friction: world::capsule_frictions(&file),
         object: object.shape,
         object_name: file.object.name.clone(),
         mass_kg: object.mass_kg,

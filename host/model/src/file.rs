@@ -261,6 +261,9 @@ keys! {
         /// The fingertips. In a file, keys of `[fingertip_defaults]` stand for those that a fingertip leaves out.
         #[serde(rename = "fingertip")]
         pub fingertips: Vec<FingertipFile>,
+        /// The surfaces of links and palm. In a file, keys of `[capsule_defaults]` stand for those that a capsule leaves out.
+        #[serde(rename = "capsule", default, skip_serializing_if = "Vec::is_empty")]
+        pub capsules: Vec<CapsuleFile>,
     }
 }
 
@@ -383,6 +386,26 @@ keys! {
         /// Largest torque about the contact's normal for each newton of normal force, m.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         pub torsional_friction_m: Option<f64>,
+    }
+}
+
+keys! {
+    /// A part of a link's surface, or of the palm's: all points within a radius of a line.
+    #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+    #[serde(deny_unknown_fields)]
+    pub struct CapsuleFile {
+        /// Name of the joint whose link it is part of; without it, the palm: the base.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        pub link: Option<String>,
+        /// Beginning of its line in the link frame, m.
+        pub from_m: [f64; 3],
+        /// End of its line, m; the beginning again for a ball.
+        pub to_m: [f64; 3],
+        /// Radius, m.
+        pub radius_m: f64,
+        /// Coefficient of its friction; the object's file may have a lower one.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        pub friction: Option<f64>,
     }
 }
 

@@ -5,9 +5,10 @@ use super::{
     build::control,
     check::{Refused, Result, all_within, fail, item, name, schema, within},
     error::{SceneError, suggestion},
-    file::{FingertipFile, HandFile, InertiaFile, JointFile, SafetyKey, SceneFile},
+    file::{CapsuleFile, FingertipFile, HandFile, InertiaFile, JointFile, SafetyKey, SceneFile},
     object::{breaks_triangle, tensor},
 };
+use blindgrasp_body::Capsule;
 use blindgrasp_body::FingertipModel;
 use blindgrasp_body::JointFriction;
 use blindgrasp_body::{Hand, MAX_FINGERS, MAX_JOINTS, Posture};
@@ -22,6 +23,9 @@ use std::f64::consts::PI;
 
 /// Numbers beyond are not computed with, in whatever unit they are.
 const LARGEST: f64 = 1e6;
+
+/// The most capsules that a hand may have: each pair of them is looked at in each step.
+const MAX_CAPSULES: usize = 64;
 
 /// A hand's file, checked from end to end.
 pub(crate) struct Examined {
@@ -55,10 +59,13 @@ impl Examined {
         for (i, fingertip) in file.fingertips.iter_mut().enumerate() {
             fingertips.push(check_fingertip(fingertip, &|name| item("fingertip", i, name), &mut refused));
         }
+        check_capsules(&file, &mut refused);
         let mut numbers: Vec<usize> = (1..=joints.len()).collect();
         let hand = tree.filter(|_| is_placed).and_then(|Tree { parents, links, kept }| {
             numbers.retain(|number| kept.contains(&(number - 1)));
             file.joints = kept.iter().map(|&k| file.joints[k].clone()).collect();
+            let is_kept = |name: &String| file.joints.iter().any(|joint| joint.name == *name);
+            file.capsules.retain(|capsule| capsule.link.as_ref().is_none_or(is_kept));
             // Parents and links are kept.
             let place = |k: usize| kept.partition_point(|&other| other < k);
             let parent = |k: usize| parents[k].map(place);
@@ -83,6 +90,21 @@ fn is_placed(file: &HandFile) -> bool {
 }
 
 impl HandFile {
+    /// Its capsules, for the hand that is prepared from it; those of links that the hand does not have are left out.
+    pub fn capsules(&self, hand: &Hand) -> Vec<Capsule> {
+        let prepared = |file: &CapsuleFile| {
+            let ends_m = [file.from_m, file.to_m].map(Vector3::from);
+            let Some(name) = &file.link else {
+                return Some(Capsule { link: None, ends_m, radius_m: file.radius_m });
+            };
+            let link = self.joints.iter().position(|joint| joint.name == *name)?;
+            let from_link = &hand.prepared_joints()[link].from_link;
+            let ends_m = ends_m.map(|end_m| from_link.tr_mul(&end_m));
+            Some(Capsule { link: Some(link), ends_m, radius_m: file.radius_m })
+        };
+        self.capsules.iter().filter_map(prepared).collect()
+    }
+
     /// Checks all that every hand needs, and prepares it. A firmware needs the table `[control]` as well.
     pub(crate) fn prepare(&self, warnings: &mut Vec<String>) -> Result<Hand> {
         let Examined { refused, hand, .. } = Examined::of(self);
@@ -195,6 +217,32 @@ fn check_fingertip(
         file.radius_m = 0.01;
     }
     Fingertip { link: 0, offset_m: file.offset_m.into(), radius_m: file.radius_m }
+}
+
+/// Checks the capsules.
+fn check_capsules(file: &HandFile, refused: &mut Refused) {
+    let count = file.capsules.len();
+    if count > MAX_CAPSULES {
+        let problem = format!("the hand has {count} capsules: at most {MAX_CAPSULES} are supported");
+        refused.take::<()>(fail("capsule", problem, "leave some out"));
+        return;
+    }
+    for (k, capsule) in file.capsules.iter().enumerate() {
+        let key = |name: &str| item("capsule", k, name);
+        if let Some(link) = &capsule.link
+            && file.joints.iter().all(|joint| joint.name != *link)
+        {
+            let known = file.joints.iter().map(|joint| joint.name.as_str());
+            let problem = format!("there is no joint `{link}`");
+            refused.take::<()>(fail(key("link"), problem, suggestion(link, known)));
+        }
+        refused.take_all([
+            all_within(&key("from_m"), &capsule.from_m, 10.0),
+            all_within(&key("to_m"), &capsule.to_m, 10.0),
+            within(&key("radius_m"), capsule.radius_m, 1e-4, 1.0),
+            within(&key("friction"), capsule.friction.unwrap_or_default(), 0.0, 100.0),
+        ]);
+    }
 }
 
 /// Checks the numbers of a joint, and replaces those that no kinematics can be computed with. Its parent is still to be told.

@@ -31,7 +31,7 @@ mod world;
 
 use blindgrasp_body::JointFriction;
 use blindgrasp_body::polyhedron::Polyhedron;
-use blindgrasp_body::{ContactFriction, FaceContact, FingertipModel};
+use blindgrasp_body::{Capsule, ContactFriction, FaceContact, FingertipModel};
 use blindgrasp_body::{Hand, MAX_JOINTS};
 use blindgrasp_shared::control::LawsConfig;
 use blindgrasp_shared::math::Real;
@@ -79,6 +79,10 @@ pub struct Scene {
     pub fingertips: Vec<FingertipModel>,
     /// The friction of each fingertip against the object, where contacts have friction.
     pub fingertip_friction: Vec<ContactFriction>,
+    /// Links and palm, where they touch; empty otherwise.
+    pub capsules: Vec<Capsule>,
+    /// The sliding friction of each capsule against the object.
+    pub capsule_friction: Vec<f64>,
     /// The object in its own frame.
     pub object: Polyhedron,
     /// Its name.

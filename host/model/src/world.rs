@@ -80,6 +80,7 @@ fn paper_only(plant: &PlantSettings) -> Result<()> {
     let given = [
         ("plant.friction", plant.friction.is_some()),
         ("plant.torsional_friction_m", plant.torsional_friction_m.is_some()),
+        ("plant.links", plant.links == Some(true)),
         ("plant.table", !plant.tables.is_empty()),
         ("plant.turn", !plant.turns.is_empty()),
         ("plant.shake", !plant.shakes.is_empty()),
@@ -88,7 +89,7 @@ fn paper_only(plant: &PlantSettings) -> Result<()> {
         None => Ok(()),
         Some((key, _)) => fail(
             key,
-            "does nothing where fingertips roll: contact that rolls has neither friction nor a table",
+            "does nothing where fingertips roll: contact that rolls has neither friction nor links nor tables",
             "set plant.contact = \"coulomb\", or leave it out",
         ),
     }
@@ -98,14 +99,25 @@ fn paper_only(plant: &PlantSettings) -> Result<()> {
 pub(super) fn frictions(file: &SceneFile) -> Vec<ContactFriction> {
     let plant = &file.plant;
     let of = |fingertip: &super::file::FingertipFile| {
-        let least = [fingertip.friction, file.object.friction].into_iter().flatten().reduce(f64::min);
         let torsion_m = plant.torsional_friction_m.or(fingertip.torsional_friction_m);
         ContactFriction {
-            sliding: plant.friction.or(least).unwrap_or(FRICTION),
+            sliding: sliding(file, fingertip.friction),
             torsion_m: torsion_m.unwrap_or(TORSIONAL_FRICTION_M),
         }
     };
     file.hand.fingertips.iter().map(of).collect()
+}
+
+/// The friction of each capsule against the object; nothing where links don't touch.
+pub(super) fn capsule_frictions(file: &SceneFile) -> Vec<f64> {
+    let capsules = file.hand.capsules.iter().filter(|_| file.plant.links_touch());
+    capsules.map(|capsule| sliding(file, capsule.friction)).collect()
+}
+
+/// The coefficient of friction between the object and a part of the hand, which may have one in its file.
+fn sliding(file: &SceneFile, of_part: Option<f64>) -> f64 {
+    let least = [of_part, file.object.friction].into_iter().flatten().reduce(f64::min);
+    file.plant.friction.or(least).unwrap_or(FRICTION)
 }
 
 /// Checks that nothing is inside a table at the start.

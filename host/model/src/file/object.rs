@@ -26,7 +26,7 @@ keys! {
         /// that of a uniform body.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         pub inertia_kg_m2: Option<InertiaFile>,
-        /// Coefficient of friction against fingertips; the hand's file may have a lower one.
+        /// Coefficient of friction against the hand, whose file may have a lower one.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         pub friction: Option<f64>,
         /// Shape: one of the tables below.

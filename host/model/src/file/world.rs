@@ -54,7 +54,7 @@ keys! {
         /// object's weight (assumption 5).
         #[serde(default, skip_serializing_if = "Option::is_none")]
         pub gravity_on_object: Option<bool>,
-        /// Coefficient of friction between fingertips and object; without it, the least of those that the object's and the
+        /// Coefficient of friction between hand and object; without it, the least of those that the object's and the
         /// hand's files give, or 0.6.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         pub friction: Option<f64>,
@@ -69,6 +69,10 @@ keys! {
         /// `contact` is `"coulomb"`.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         pub rotors: Option<bool>,
+        /// `true`: links and palm touch the object, tables and each other, as the hand's file has them (`[[capsule]]`). Without it,
+        /// they do so where `contact` is `"coulomb"`; where it is `"rolling"`, they can't.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        pub links: Option<bool>,
         /// Tables, one `[[plant.table]]` each; with `contact = "coulomb"`.
         #[serde(rename = "table", default, skip_serializing_if = "Vec::is_empty")]
         pub tables: Vec<TableFile>,
@@ -105,6 +109,11 @@ impl PlantSettings {
         self.joint_limits.unwrap_or(self.has_friction())
     }
 
+    /// `true` if links and palm touch.
+    pub fn links_touch(&self) -> bool {
+        self.links.unwrap_or(self.has_friction())
+    }
+
     /// `true` if rotors have inertia.
     pub fn rotors_turn(&self) -> bool {
         self.rotors.unwrap_or(self.has_friction())
@@ -122,6 +131,7 @@ impl Default for PlantSettings {
             torsional_friction_m: None,
             joint_limits: None,
             rotors: None,
+            links: None,
             tables: Vec::new(),
             turns: Vec::new(),
             shakes: Vec::new(),

@@ -328,3 +328,48 @@ fn references_are_relative_to_the_file() {
     assert_eq!(load(&windows, &[]).map(|scene| scene.name), Ok("cube".into()));
     std::fs::remove_dir_all(&folder).unwrap();
 }
+
+/// Ends of capsules are where the joints' own numbers put them, one joint after the other; friction is the least that is given.
+#[test]
+fn capsules_lie_where_their_links_do() {
+    let capsule = |link: Option<&str>, friction| crate::file::CapsuleFile {
+        link: link.map(str::to_owned),
+        from_m: [0.003, -0.002, 0.001],
+        to_m: [0.002, 0.004, 0.02],
+        radius_m: 0.001,
+        friction,
+    };
+    let mut file = load("allegro-like-prism-table", &[]).unwrap().file;
+    file.hand.capsules = vec![
+        capsule(None, None),
+        capsule(Some("thumb-flex-1"), Some(0.2)),
+        capsule(Some("ring-flex-3"), Some(2.0)),
+    ];
+    file.object.friction = Some(0.5);
+    let scene = Scene::build(file.clone()).unwrap();
+    let posture = posture(&scene.hand, &scene.start.angles_rad);
+    for (k, capsule) in file.hand.capsules.iter().enumerate() {
+        let ends_m = blindgrasp_body::Part::Capsule(k).ends_m(&posture, &scene.capsules);
+        for (end_m, own_m) in ends_m.into_iter().zip([capsule.from_m, capsule.to_m]) {
+            let mut expected_m = Vector3::from(own_m);
+            let mut link = capsule.link.clone();
+            while let Some(name) = link {
+                let index = file.hand.joints.iter().position(|joint| joint.name == name).unwrap();
+                let joint = &file.hand.joints[index];
+                let axis = nalgebra::Unit::new_normalize(Vector3::from(joint.axis));
+                let turn = UnitQuaternion::from_axis_angle(&axis, scene.start.angles_rad[index]);
+                let [roll, pitch, yaw] = joint.rotation_rpy_rad;
+                let frame = UnitQuaternion::from_euler_angles(roll, pitch, yaw);
+                expected_m = Vector3::from(joint.offset_m) + frame * (turn * expected_m);
+                link = joint.parent.clone();
+            }
+            assert!((end_m - expected_m).norm() < 1e-15, "{k}: {end_m} {expected_m}");
+        }
+    }
+    assert_eq!(scene.capsule_friction, [0.5, 0.2, 0.5]);
+    file.plant.friction = Some(0.7);
+    assert_eq!(Scene::build(file.clone()).unwrap().capsule_friction, [0.7; 3]);
+    file.plant.links = Some(false);
+    let without = Scene::build(file).unwrap();
+    assert!(without.capsules.is_empty() && without.capsule_friction.is_empty());
+}

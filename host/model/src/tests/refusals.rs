@@ -2,6 +2,7 @@
 
 use super::cases::cases;
 use super::*;
+use crate::file::CapsuleFile;
 
 /// The whole message of a scene that has to be refused.
 fn message(text: &str) -> String {
@@ -47,7 +48,10 @@ fn massless_fingers_are_refused() {
 
 #[test]
 fn scenes_built_in_code_refuse_numbers_that_are_none() {
-    let good = load("cube", &[]).unwrap().file;
+    let mut good = load("cube", &[]).unwrap().file;
+    let palm =
+        CapsuleFile { link: None, from_m: [0.0; 3], to_m: [0.01, 0.0, 0.0], radius_m: 1e-3, friction: None };
+    good.hand.capsules.push(palm);
     let fields: &[fn(&mut SceneFile) -> &mut f64] = &[
         |s| &mut s.duration_s,
         |s| &mut s.control.gains.grasp[0],
@@ -88,6 +92,10 @@ fn scenes_built_in_code_refuse_numbers_that_are_none() {
         |s| s.hand.fingertips[1].friction.get_or_insert(0.5),
         |s| s.hand.fingertips[1].torsional_friction_m.get_or_insert(1e-3),
         |s| s.object.friction.get_or_insert(0.5),
+        |s| &mut s.hand.capsules[0].from_m[0],
+        |s| &mut s.hand.capsules[0].to_m[2],
+        |s| &mut s.hand.capsules[0].radius_m,
+        |s| s.hand.capsules[0].friction.get_or_insert(0.5),
         |s| &mut s.hand.fingertips[1].offset_m[0],
         |s| &mut s.hand.fingertips[1].radius_m,
         |s| &mut s.hand.fingertips[1].stiffness_n_m2,
@@ -113,4 +121,17 @@ fn scenes_built_in_code_refuse_numbers_that_are_none() {
         file.start.indentation_m = Indentation::Metres(indentation);
         assert!(Scene::build(file).is_err());
     }
+}
+
+#[test]
+fn a_hand_has_at_most_64_capsules() {
+    let mut file = load("cube", &[]).unwrap().file;
+    let ball = CapsuleFile { link: None, from_m: [0.0; 3], to_m: [0.0; 3], radius_m: 1e-3, friction: None };
+    file.hand.capsules = vec![ball.clone(); 64];
+    assert!(Scene::build(file.clone()).is_ok());
+    file.hand.capsules.push(ball);
+    assert_eq!(
+        Scene::build(file).unwrap_err().to_string(),
+        "hand.capsule: the hand has 65 capsules: at most 64 are supported; leave some out"
+    );
 }
