@@ -1,7 +1,7 @@
 //! The paper's title: an *arbitrary* polyhedral object. Random polyhedra, and meshes with noise, placed in the paper's hand and
 //! grasped in the paper's own model for 5 s, with `u_st` and without.
 
-use blindgrasp::model::file::FingertipFile;
+use blindgrasp::model::file::{CapsuleFile, FingertipFile};
 use blindgrasp::model::{HandFile, ObjectFile, Parts};
 use blindgrasp::place::population::{
     DENSITY_KG_M3, Draw, EXTENT_M, RandomPolyhedron, SEED, polyhedra, polyhedron,
@@ -246,23 +246,33 @@ fn the_whole_table_with_weight() {
 fn ring(fingers: usize) -> HandFile {
     let paper = HandFile::load("three-finger").expect("built in");
     let (first, tip) = (&paper.joints[..4], &paper.fingertips[0]);
-    let mut hand = HandFile { joints: Vec::new(), fingertips: Vec::new(), ..paper.clone() };
+    let mut hand =
+        HandFile { joints: Vec::new(), fingertips: Vec::new(), capsules: Vec::new(), ..paper.clone() };
+    let of_first = |capsule: &&CapsuleFile| {
+        let is_below_it = capsule.to_m[1] == first[0].offset_m[1];
+        capsule.link.as_ref().map_or(is_below_it, |link| link.starts_with("finger-1"))
+    };
     for finger in 1..=fingers {
         let named = |name: &str| name.replace("finger-1", &format!("finger-{finger}"));
         let turn = (finger - 1) as f64 * std::f64::consts::TAU / fingers as f64;
+        let (sine, cosine) = turn.sine_cosine();
+        // The first finger stands at -90 degrees.
+        let base_m = [0.035 * sine, -0.035 * cosine, 0.0];
         for joint in first {
             let mut joint = joint.clone();
             joint.name = named(&joint.name);
             joint.parent = joint.parent.as_deref().map(named);
             if joint.parent.is_none() {
-                let (sine, cosine) = turn.sine_cosine();
-                // The first finger stands at -90 degrees.
-                joint.offset_m = [0.035 * sine, -0.035 * cosine, 0.0];
+                joint.offset_m = base_m;
                 joint.rotation_rpy_rad[2] += turn;
             }
             hand.joints.push(joint);
         }
         hand.fingertips.push(FingertipFile { name: named(&tip.name), link: named(&tip.link), ..tip.clone() });
+        hand.capsules.extend(paper.capsules.iter().filter(of_first).map(|capsule| match &capsule.link {
+            Some(link) => CapsuleFile { link: Some(named(link)), ..capsule.clone() },
+            None => CapsuleFile { to_m: base_m, ..capsule.clone() },
+        }));
     }
     hand
 }

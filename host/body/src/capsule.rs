@@ -1,6 +1,7 @@
 //! Links and palm as capsules, and what of a hand can touch what.
 
 use crate::{Hand, Posture};
+use blindgrasp_shared::math::norm;
 use nalgebra::Vector3;
 
 /// All points within a radius of a line, on a link or on the palm.
@@ -78,6 +79,14 @@ pub fn pairs(hand: &Hand, capsules: &[Capsule]) -> Vec<[Part; 2]> {
         }
     }
     pairs
+}
+
+/// Returns how deep two parts are in each other, m; negative where they are apart.
+pub fn overlap_m(parts: [Part; 2], hand: &Hand, posture: &Posture, capsules: &[Capsule]) -> f64 {
+    let [a, b] = parts.map(|part| part.ends_m(posture, capsules));
+    let [s, t] = closest_of_lines([&a, &b]);
+    let apart_m = (a[0] + (a[1] - a[0]) * s) - (b[0] + (b[1] - b[0]) * t);
+    parts.map(|part| part.radius_m(hand, capsules)).into_iter().sum::<f64>() - norm(&apart_m)
 }
 
 /// Returns how far along each of two lines (0 to 1) the points are that are closest to each other.

@@ -8,7 +8,7 @@ pub mod inverse_kinematics;
 mod parts;
 pub mod polyhedron;
 
-pub use capsule::{Capsule, Part, closest_of_lines, pairs};
+pub use capsule::{Capsule, Part, closest_of_lines, overlap_m, pairs};
 pub use equilibrium::equilibrium_indentations;
 pub use parts::{CORNER_STIFFNESS_N_M, ContactFriction, FaceContact, FingertipModel, JointFriction, Push};
 

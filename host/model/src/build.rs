@@ -28,12 +28,14 @@ pub(super) fn parts(file: &SceneFile) -> Result<Parts> {
     // The gains of the scene are what acts; those of the hand say which firmware is its own.
     let hand = file.hand.prepare(&mut warnings).map_err(|error| error.below("hand"))?;
     let object = object(&file.object, &mut warnings).map_err(|error| error.below("object"))?;
-    Ok(Parts { hand, object, substeps, warnings })
+    let touch = file.plant.links.unwrap_or(true);
+    let capsules = if touch { file.hand.capsules(&hand) } else { Vec::new() };
+    Ok(Parts { hand, capsules, object, substeps, warnings })
 }
 
 /// Checks a configuration and prepares the scene.
 pub(super) fn scene(file: SceneFile) -> Result<Scene> {
-    let Parts { hand, object, substeps, mut warnings } = parts(&file)?;
+    let parts = parts(&file)?;
     let attitude = file.pose.attitude()?;
     all_within("pose.position_m", &file.pose.position_m, 100.0)?;
     let position_m = Vector3::from(file.pose.position_m);
@@ -46,16 +48,17 @@ pub(super) fn scene(file: SceneFile) -> Result<Scene> {
             "give one [[contact]] for each fingertip, in the hand's order",
         );
     }
-    let (contacts, start) = start(&file, &hand, &object.shape, position_m, attitude)?;
-    if let Some(&k) = still_joints(&hand, &start.angles_rad).first() {
+    let Parts { hand, object, .. } = &parts;
+    let (contacts, start) = start(&file, hand, &object.shape, position_m, attitude)?;
+    if let Some(&k) = still_joints(hand, &start.angles_rad).first() {
         let problem = format!("joint `{}` moves no mass", file.hand.joints[k].name);
         return fail(item("hand.joint", k, "mass_kg"), problem, "give its link a mass and an inertia");
     }
-    world::at_start(&file, &hand, &object.shape, &start)?;
+    world::at_start(&file, &parts, &start)?;
+    let Parts { hand, capsules, object, substeps, mut warnings } = parts;
     world::sinking(&file.plant, object.mass_kg, &mut warnings);
     overlaps(&file.hand, &hand, &start.angles_rad, &mut warnings);
 
-    let capsules = if file.plant.links_touch() { file.hand.capsules(&hand) } else { Vec::new() };
     Ok(Scene {
         name: file.name.clone(),
         description: file.description.clone(),
@@ -65,7 +68,7 @@ pub(super) fn scene(file: SceneFile) -> Result<Scene> {
         joints: file.hand.joints.iter().map(|joint| joint_parameters(joint, &file)).collect(),
         fingertips: file.hand.fingertips.iter().map(fingertip_parameters).collect(),
         fingertip_friction: world::frictions(&file),
-        capsules,
+        capsules: if file.plant.links_touch() { capsules } else { Vec::new() },
         capsule_friction: world::capsule_frictions(&file),
         object: object.shape,
         object_name: file.object.name.clone(),

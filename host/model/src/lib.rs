@@ -11,6 +11,7 @@
 mod build;
 mod check;
 mod controller;
+mod crossing;
 mod draft;
 mod error;
 pub mod file;
@@ -120,6 +121,8 @@ pub struct Scene {
 pub struct Parts {
     /// Kinematics and link masses of the hand.
     pub hand: Hand,
+    /// Its links and palm, whatever the contact; empty where the scene says that they don't touch.
+    pub capsules: Vec<Capsule>,
     /// The object.
     pub object: ObjectBody,
     /// The number of steps of the integrator in one control period.

@@ -2,9 +2,8 @@
 
 use super::check::{Result, all_within, fail, item, within};
 use super::file::{PlantSettings, SceneFile};
-use super::{Scene, Start, hand::posture};
-use blindgrasp_body::polyhedron::Polyhedron;
-use blindgrasp_body::{CORNER_STIFFNESS_N_M, ContactFriction, Hand};
+use super::{Parts, Scene, Start, crossing, hand::posture};
+use blindgrasp_body::{CORNER_STIFFNESS_N_M, ContactFriction};
 use nalgebra::Vector3;
 
 /// Coefficient of friction where no file gives one: that of rubber on a smooth box.
@@ -120,33 +119,26 @@ fn sliding(file: &SceneFile, of_part: Option<f64>) -> f64 {
     file.plant.friction.or(least).unwrap_or(FRICTION)
 }
 
-/// Checks that nothing is inside a table at the start.
-pub(super) fn at_start(file: &SceneFile, hand: &Hand, shape: &Polyhedron, start: &Start) -> Result<()> {
+/// Checks that nothing is inside anything else at the start, where contacts have friction.
+pub(super) fn at_start(file: &SceneFile, parts: &Parts, start: &Start) -> Result<()> {
+    let shape = &parts.object.shape;
     if !file.plant.has_friction() {
         return Ok(());
     }
-    let posture = posture(hand, &start.angles_rad);
+    let posture = &posture(&parts.hand, &start.angles_rad);
+    let capsules = if file.plant.links_touch() { &parts.capsules[..] } else { &[] };
+    let posed = crossing::Posed { file: &file.hand, hand: &parts.hand, capsules, posture };
+    posed.are_above(&file.plant.tables)?;
     for (t, table) in file.plant.tables.iter().enumerate() {
-        let key = item("plant.table", t, "point_m");
-        let height_m = |point_m: &Vector3<f64>| {
-            Vector3::from(table.normal).dot(&(point_m - Vector3::from(table.point_m)))
-        };
-        for (fingertip, centre_m) in file.hand.fingertips.iter().zip(&posture.centres_m) {
-            let depth_m = fingertip.radius_m - height_m(centre_m);
-            if depth_m > 0.0 {
-                let problem =
-                    format!("fingertip `{}` is {:.3} mm inside the table", fingertip.name, depth_m * 1e3);
-                return fail(key, problem, "move the table, or grasp the object farther from it");
-            }
-        }
         let corners = shape.vertices_m.iter().map(|corner_m| start.position_m + start.attitude * corner_m);
-        let lowest_m = corners.map(|corner_m| height_m(&corner_m)).fold(f64::INFINITY, f64::min);
+        let lowest_m =
+            corners.map(|corner_m| crossing::height_m(table, &corner_m)).fold(f64::INFINITY, f64::min);
         if lowest_m < -SUNK_M {
             let problem = format!("the object is {:.3} mm inside the table", -lowest_m * 1e3);
-            return fail(key, problem, "move the table or the object's pose");
+            return fail(item("plant.table", t, "point_m"), problem, "move the table or the object's pose");
         }
     }
-    Ok(())
+    posed.are_apart()
 }
 
 /// Tells an object that is too heavy for the softness of tables.

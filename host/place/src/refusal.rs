@@ -82,6 +82,8 @@ pub(super) struct Count {
     pub(super) at_stop: Tally<Miss>,
     /// At which fingertips overlap (m), or meet another part of the object (m).
     pub(super) overlap: Tally<Miss>,
+    /// At which links would be inside each other, a fingertip or the palm (m).
+    pub(super) cross: Tally<Miss>,
     /// At which a fingertip would touch with its back.
     pub(super) back: Tally<Miss>,
     /// At which a bone passes through the object.
@@ -97,6 +99,7 @@ impl Count {
             Miss::Unreachable(by) => self.unreachable.add(by.distance_m, miss),
             Miss::AtStop(_) => self.at_stop.add(0.0, miss),
             Miss::Overlap(_, _, by) | Miss::Beside(_, by) => self.overlap.add(by, miss),
+            Miss::Cross(_, by) => self.cross.add(by, miss),
             Miss::Back(_, cosine) => self.back.add(-cosine, miss),
             Miss::Through(_) | Miss::TipThrough(_) => self.through.add(0.0, miss),
         }
@@ -131,6 +134,7 @@ impl Count {
             (&self.unreachable, "tried, but a fingertip does not quite get there"),
             (&self.at_stop, "tried, but a joint would stand at its end stop"),
             (&self.overlap, "tried, but a fingertip would be in the way"),
+            (&self.cross, "tried, but links would be in each other's way"),
             (&self.back, "tried, but a fingertip would touch with its back"),
             (&self.through, "tried, but a finger would pass through the object"),
         ];
@@ -151,7 +155,7 @@ impl Count {
         if let Some((_, why)) = &self.refused.nearest {
             return format!("the fingers get there, but the scene is refused: {why}");
         }
-        let tried = [&self.unreachable, &self.at_stop, &self.overlap, &self.back, &self.through];
+        let tried = [&self.unreachable, &self.at_stop, &self.overlap, &self.cross, &self.back, &self.through];
         if tried.iter().any(|tally| tally.failed > 0) {
             let worst = tried.into_iter().max_by_key(|tally| tally.failed);
             let miss = worst.map_or(String::new(), |tally| nearest(tally, |_, miss| words.miss(miss)));
@@ -240,6 +244,10 @@ impl Words<'_> {
                     by * 1e3
                 )
             }
+            Miss::Cross(parts, by) => {
+                let [a, b] = parts.map(|part| self.hand.part_in_words(part));
+                format!("{a} and {b} would overlap by {:.1} mm", by * 1e3)
+            }
             Miss::Back(i, _) => format!("fingertip `{}` would touch with its back", fingertip(i)),
             Miss::Through(k) => {
                 format!("the bone to joint `{}` would pass through the object", self.hand.joints[k].name)
@@ -254,6 +262,7 @@ impl Words<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use blindgrasp_body::Part;
     use blindgrasp_body::inverse_kinematics::Unreachable;
     use blindgrasp_model::{Parts, Scene};
 
@@ -276,6 +285,14 @@ mod tests {
             (
                 Miss::Beside(1, 0.002),
                 "fingertip `finger-2` would be 2.0 mm inside another part of the object",
+            ),
+            (
+                Miss::Cross([Part::Capsule(0), Part::Fingertip(1)], 0.0014),
+                "the palm (capsule 1) and fingertip `finger-2` would overlap by 1.4 mm",
+            ),
+            (
+                Miss::Cross([Part::Capsule(3), Part::Capsule(7)], 0.0021),
+                "link `finger-1-flex-1` (capsule 4) and link `finger-2-flex-2` (capsule 8) would overlap by 2.1 mm",
             ),
             (Miss::Back(2, -0.3), "fingertip `finger-3` would touch with its back"),
             (Miss::Through(3), "the bone to joint `finger-1-flex-3` would pass through the object"),

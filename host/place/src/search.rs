@@ -5,7 +5,7 @@ use super::candidate::{self, Candidate, Contacts};
 use super::position::{self, ROOM_RAD, Target};
 use super::quality::{Quality, score};
 use super::refusal::{Count, Words};
-use super::stance::{self, Miss, Stance};
+use super::stance::{self, Miss, Stance, Taker};
 use super::task::Task;
 use super::{NARROWEST, NoPlacement, Placement, Refusal, Request};
 use blindgrasp_body::equilibrium_indentations;
@@ -197,7 +197,13 @@ fn stance(
 
 fn take(task: &Task<'_>, stance: &Stance) -> Result<f64, Miss> {
     let parts = &task.request.parts;
-    stance::take(&parts.hand, &task.request.reach.nominal_rad, &parts.object.shape, stance)
+    let taker = Taker {
+        hand: &parts.hand,
+        capsules: &parts.capsules,
+        pairs: &task.pairs,
+        nominal_rad: &task.request.reach.nominal_rad,
+    };
+    stance::take(&taker, &parts.object.shape, stance)
 }
 
 /// The scene of a draft, in numbers that can be read, if its checks agree.

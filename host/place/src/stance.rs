@@ -3,11 +3,11 @@
 use super::position::FACING;
 use blindgrasp_body::inverse_kinematics::{Unreachable, own_joints, place};
 use blindgrasp_body::polyhedron::Polyhedron;
-use blindgrasp_body::{Hand, Posture};
+use blindgrasp_body::{Capsule, Hand, Part, Posture, overlap_m};
 use blindgrasp_model::posture;
 use nalgebra::{UnitQuaternion, Vector3};
 
-/// Room that a fingertip needs from parts of the object beside its face, m: more than a scene asks for.
+/// Room that fingertips and links need from what they must not be inside of, m: more than a scene asks for.
 const CLEAR_M: f64 = 1e-6;
 
 /// The places of hand and object.
@@ -42,15 +42,31 @@ pub(super) enum Miss {
     TipThrough(usize),
     /// A fingertip's sphere meets another part of the object, by so many metres.
     Beside(usize, f64),
+    /// Two parts of the hand of which one is no fingertip are inside each other, by so many metres.
+    Cross([Part; 2], f64),
+}
+
+/// The hand that takes a stance.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Taker<'a> {
+    pub(super) hand: &'a Hand,
+    /// Its links and palm.
+    pub(super) capsules: &'a [Capsule],
+    /// The parts that may not be inside each other, besides two fingertips.
+    pub(super) pairs: &'a [[Part; 2]],
+    pub(super) nominal_rad: &'a [f64],
+}
+
+/// The pairs of parts that may touch and of which one is no fingertip.
+pub(super) fn pairs(hand: &Hand, capsules: &[Capsule]) -> Vec<[Part; 2]> {
+    let mut pairs = blindgrasp_body::pairs(hand, capsules);
+    pairs.retain(|parts| parts.iter().any(|part| matches!(part, Part::Capsule(_))));
+    pairs
 }
 
 /// The least distance of a joint that moves one fingertip from an end stop, rad.
-pub(super) fn take(
-    hand: &Hand,
-    nominal_rad: &[f64],
-    shape: &Polyhedron,
-    stance: &Stance,
-) -> Result<f64, Miss> {
+pub(super) fn take(taker: &Taker<'_>, shape: &Polyhedron, stance: &Stance) -> Result<f64, Miss> {
+    let &Taker { hand, nominal_rad, .. } = taker;
     for (i, centre) in stance.centres_m.iter().enumerate() {
         for (j, other) in stance.centres_m[..i].iter().enumerate() {
             let overlap = hand.radius_m(i) + hand.radius_m(j) - (centre - other).norm();
@@ -78,8 +94,17 @@ pub(super) fn take(
         }
     }
     through(hand, &posture, shape, stance)?;
+    apart(taker, &posture)?;
     let (room_rad, joint) = room(hand, &angles);
     if room_rad > 0.0 { Ok(room_rad) } else { Err(Miss::AtStop(joint)) }
+}
+
+/// Checks that no links are inside each other, a fingertip or the palm.
+fn apart(taker: &Taker<'_>, posture: &Posture) -> Result<(), Miss> {
+    taker.pairs.iter().try_for_each(|&parts| {
+        let overlap = overlap_m(parts, taker.hand, posture, taker.capsules);
+        if overlap > -CLEAR_M { Err(Miss::Cross(parts, overlap)) } else { Ok(()) }
+    })
 }
 
 /// The least distance of a joint from an end stop, rad, and which it is; of joints that move one fingertip.

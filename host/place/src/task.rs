@@ -4,8 +4,8 @@ use super::combination::most_faces;
 use super::facet::Facet;
 use super::points::Fingertips;
 use super::rolling::{Gains, Rolling};
-use super::{NARROWEST, Request, SPARE, attitude};
-use blindgrasp_body::MAX_FINGERS;
+use super::{NARROWEST, Request, SPARE, attitude, stance};
+use blindgrasp_body::{MAX_FINGERS, Part};
 use blindgrasp_model::{SceneError, posture};
 use blindgrasp_shared::math::Real;
 use nalgebra::{UnitQuaternion, Vector2, Vector3};
@@ -42,6 +42,8 @@ pub(super) struct Task<'a> {
     pub(super) nominal_m: Vec<Vector3<f64>>,
     /// Attitudes to choose from.
     pub(super) attitudes: Vec<UnitQuaternion<f64>>,
+    /// The pairs of parts that may not be inside each other, besides two fingertips.
+    pub(super) pairs: Vec<[Part; 2]>,
 }
 
 impl<'a> Task<'a> {
@@ -104,6 +106,7 @@ impl<'a> Task<'a> {
             nominal_middle_m: middle,
             nominal_m: centres.iter().map(|centre| centre - middle).collect(),
             attitudes,
+            pairs: stance::pairs(hand, &request.parts.capsules),
         })
     }
 

@@ -330,3 +330,46 @@ fn a_template_without_gains_is_refused() {
         template(HandFile::load("three-finger").unwrap(), ObjectFile::load("cube").unwrap(), false).unwrap();
     assert_eq!(real.start.indentation_m, Indentation::Metres(1e-4));
 }
+
+/// Links that can't be apart leave no placement; a scene in which links don't touch has the one of a hand that has none.
+#[test]
+fn links_may_not_be_inside_each_other() {
+    let with = |radius_m: f64, links: Option<bool>| {
+        let mut case = Case::new("three-finger", "cube").like;
+        case.hand.capsules.iter_mut().for_each(|capsule| capsule.radius_m = radius_m);
+        case.plant.links = links;
+        Case::of(case)
+    };
+    let refusal = with(0.035, None).refusal();
+    let links = refusal.tests.iter().find(|test| test.what.contains("links would be in each other's way"));
+    assert!(links.is_some_and(|test| test.nearest.contains("would overlap by")), "{refusal}");
+    let mut none = Case::new("three-finger", "cube").like;
+    none.hand.capsules.clear();
+    let place = |case: Case| case.place(1).unwrap().remove(0).scene.file;
+    let (free, none) = (place(with(0.035, Some(false))), place(Case::of(none)));
+    let usual = place(Case::new("three-finger", "cube"));
+    assert_eq!((&free.pose, &free.contacts), (&none.pose, &none.contacts));
+    assert_eq!((&usual.pose, &usual.contacts), (&none.pose, &none.contacts));
+}
+
+/// A table leaves room under what of a finger hangs lowest, and under an arm that reaches below it links don't touch.
+#[test]
+fn a_table_leaves_room_under_links() {
+    let on_a_table = |like: SceneFile| Case::of(like).place(1).unwrap()[0].on_a_table();
+    let like = Case::new("three-finger", "cube").like;
+    let usual = on_a_table(like.clone());
+    let mut hanging = like;
+    // Beyond the fingertip, away from the object: 40 mm along the link and 20 mm outwards.
+    hanging.hand.capsules[5].to_m = [-0.02, 0.0, 0.04];
+    let lower = on_a_table(hanging);
+    let capsule = blindgrasp_body::Part::Capsule(5);
+    let scene = Scene::build(lower.clone()).unwrap();
+    let posture = blindgrasp_model::posture(&scene.hand, &scene.start.angles_rad);
+    let end_m = capsule.ends_m(&posture, &scene.capsules)[1];
+    let height_m = lower.plant.tables[0].point_m[2] - end_m.z - 0.010;
+    assert!(lower.plant.tables[0].point_m[2] > usual.plant.tables[0].point_m[2] + 1e-3, "{lower:?}");
+    assert!((height_m - 1e-3).abs() < 1e-12, "{height_m}");
+    let arm = on_a_table(Case::new("hand-arm", "prism").like);
+    assert_eq!((arm.plant.links, usual.plant.links), (Some(false), None));
+    assert!(Scene::build(arm).is_ok_and(|scene| scene.capsules.is_empty()));
+}

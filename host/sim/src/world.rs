@@ -48,12 +48,13 @@ pub fn world(scene: &Scene) -> Option<World> {
     let turns = !(plant.turns.is_empty() && plant.shakes.is_empty());
     plant.has_friction().then(|| World {
         fingertip_friction: scene.fingertip_friction.clone(),
+        capsules: scene.capsules.clone(),
+        capsule_friction: scene.capsule_friction.clone(),
         tables: plant.tables.iter().map(|file| table(file, scene)).collect(),
         gravity_m_s2: turns.then(|| {
             let plant = plant.clone();
             Path::new(move |t_s| gravity_m_s2(&plant, t_s) - shaking_m_s2(&plant, t_s))
         }),
-        ..World::default()
     })
 }
 

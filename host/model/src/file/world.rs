@@ -150,7 +150,7 @@ keys! {
         /// Its direction out of the table, a unit vector.
         #[serde(default = "TableFile::normal")]
         pub normal: [f64; 3],
-        /// Coefficient of friction against the object.
+        /// Coefficient of friction against object and links.
         #[serde(default = "TableFile::friction")]
         pub friction: f64,
         /// Coefficient of friction against fingertips.

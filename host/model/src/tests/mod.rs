@@ -9,7 +9,7 @@ mod refusals;
 
 use super::*;
 use crate::file::{ContactFile, Indentation, InertiaFile, PushFile, ShapeFile};
-use blindgrasp_body::Posture;
+use blindgrasp_body::{Part, Posture, overlap_m, pairs};
 use blindgrasp_meshes::Numbers;
 
 fn text(name: &str) -> &'static str {
@@ -349,7 +349,7 @@ fn capsules_lie_where_their_links_do() {
     let scene = Scene::build(file.clone()).unwrap();
     let posture = posture(&scene.hand, &scene.start.angles_rad);
     for (k, capsule) in file.hand.capsules.iter().enumerate() {
-        let ends_m = blindgrasp_body::Part::Capsule(k).ends_m(&posture, &scene.capsules);
+        let ends_m = Part::Capsule(k).ends_m(&posture, &scene.capsules);
         for (end_m, own_m) in ends_m.into_iter().zip([capsule.from_m, capsule.to_m]) {
             let mut expected_m = Vector3::from(own_m);
             let mut link = capsule.link.clone();
@@ -372,4 +372,44 @@ fn capsules_lie_where_their_links_do() {
     file.plant.links = Some(false);
     let without = Scene::build(file).unwrap();
     assert!(without.capsules.is_empty() && without.capsule_friction.is_empty());
+}
+
+/// No capsule of a hand that is built in is in the way of another part, neither at the start of a scene nor at the nominal
+/// posture; and no pair of parts that may touch is so in most of a thousand random postures, as parts are that always overlap.
+#[test]
+fn capsules_of_built_in_hands_are_apart() {
+    let deepest_m = |file: &HandFile, hand: &Hand, angles_rad: &[f64]| {
+        let (capsules, posture) = (file.capsules(hand), posture(hand, angles_rad));
+        let has_capsule = |parts: &[Part; 2]| parts.iter().any(|part| matches!(part, Part::Capsule(_)));
+        let pairs = pairs(hand, &capsules).into_iter().filter(has_capsule);
+        let depths_m = pairs.map(|parts| (overlap_m(parts, hand, &posture, &capsules), parts));
+        let (depth_m, parts) = depths_m.max_by(|a, b| a.0.total_cmp(&b.0)).expect("the hand has capsules");
+        let [a, b] = parts.map(|part| file.part_in_words(part));
+        println!("{}: {a} and {b} are {:.1} mm apart", file.name, -depth_m * 1e3);
+        depth_m
+    };
+    for name in Scene::built_in() {
+        let scene = load(name, &[]).unwrap();
+        assert!(deepest_m(&scene.file.hand, &scene.hand, &scene.start.angles_rad) < 0.0, "{name}");
+    }
+    for name in HandFile::built_in() {
+        let (file, hand, _) = HandFile::load_checked(name).unwrap();
+        let nominal_rad: Vec<f64> = file.joints.iter().map(|joint| joint.nominal_rad).collect();
+        assert!(deepest_m(&file, &hand, &nominal_rad) < 0.0, "{name}");
+        let (mut numbers, capsules) = (Numbers(1), file.capsules(&hand));
+        let mut crossings: Vec<_> = pairs(&hand, &capsules).into_iter().map(|parts| (parts, 0)).collect();
+        for _ in 0..1000 {
+            let angle = |(lower, upper): (f64, f64)| lower + (upper - lower) * numbers.unit();
+            let angles_rad: Vec<f64> =
+                (0..hand.joint_count()).map(|k| hand.range_rad(k)).map(angle).collect();
+            let posture = posture(&hand, &angles_rad);
+            for (parts, count) in &mut crossings {
+                *count += usize::from(overlap_m(*parts, &hand, &posture, &capsules) > 0.0);
+            }
+        }
+        let (parts, count) = crossings.iter().max_by_key(|(_, count)| count).unwrap();
+        let [a, b] = parts.map(|part| file.part_in_words(part));
+        println!("{name}: {} pairs; {a} and {b} cross in {count} of 1000 postures", crossings.len());
+        assert!(*count < 500, "{name}");
+    }
 }

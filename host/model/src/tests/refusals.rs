@@ -135,3 +135,24 @@ fn a_hand_has_at_most_64_capsules() {
         "hand.capsule: the hand has 65 capsules: at most 64 are supported; leave some out"
     );
 }
+
+/// Where links don't touch, only fingertips are in each other's way.
+#[test]
+fn links_may_be_inside_each_other_where_they_do_not_touch() {
+    let (thick, deep) = ("hand.capsule.*.radius_m=0.03", "plant.table.1.point_m.3=0.3");
+    let error = load("cube-table", &[thick, deep]).unwrap_err();
+    assert_eq!(error.key, "plant.links");
+    let error = load("cube-table", &[thick]).unwrap_err();
+    assert_eq!(error.key, "plant.table.1.point_m");
+    assert!(load("cube-table", &[thick, "plant.links=false"]).is_ok());
+    assert!(load("cube", &[thick]).is_ok(), "nothing touches but fingertips where they roll");
+    let mut crossing = vec!["contact.1.point_m=[0.02, -0.024, 0]", "contact.2.point_m=[0.024, -0.02, 0]"];
+    let rolling = load("cube", &crossing).unwrap();
+    assert!(rolling.warnings[0].starts_with("fingertips `finger-1` and `finger-2` overlap"));
+    crossing.push("plant.links=false");
+    assert_eq!(load("cube-table", &crossing).unwrap_err().key, "contact.2.point_m");
+    // A palm touches no table.
+    assert!(
+        load("cube-table", &["hand.capsule.1.from_m=[0, -1, 1]", "hand.capsule.1.to_m=[0, -1, 1]"]).is_ok()
+    );
+}

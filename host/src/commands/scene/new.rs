@@ -106,7 +106,13 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
     let [hand, object] = references;
     let is_on_table = !(arguments.ideal || arguments.rolling);
     if is_on_table && let Some(best) = placements.first_mut() {
-        best.scene = Scene::build(best.on_a_table())?;
+        let file = best.on_a_table();
+        if file.plant.links != like.plant.links {
+            eprintln!(
+                "blindgrasp: the arm reaches below the table's surface, as if it stood beside it: links touch nothing in this scene (plant.links = false)"
+            );
+        }
+        best.scene = Scene::build(file)?;
     }
     let summary = Simulation::new(&placements[0].scene)?.run().summary;
     let outcome = in_words(&summary);

@@ -4,7 +4,7 @@ use super::meeting::{Meeting, Meetings};
 use super::reach::{Sense, extreme_m};
 use super::specimen::Specimen;
 use super::strength;
-use crate::file::{FingertipFile, JointFile};
+use crate::file::{CapsuleFile, FingertipFile, JointFile};
 use crate::{HandFile, posture};
 use blindgrasp_body::MAX_JOINTS;
 use nalgebra::Vector3;
@@ -63,6 +63,19 @@ pub struct FingertipFacts {
     pub limited_by: Option<String>,
     /// The largest force in the direction in which it is weakest, N.
     pub least_force_n: Option<f64>,
+}
+
+/// A capsule of a link or of the palm.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct CapsuleFacts {
+    /// Its number in the file, from 1.
+    pub number: usize,
+    /// The joint whose link it is on; `None` for the palm.
+    pub link: Option<String>,
+    /// Length of its line, m; 0 for a ball.
+    pub length_m: f64,
+    /// Radius, m.
+    pub radius_m: f64,
 }
 
 /// The reach of a fingertip's centre.
@@ -165,6 +178,17 @@ pub(super) fn fingertips(file: &HandFile, specimen: Option<&Specimen>) -> Vec<Fi
         }
     };
     file.fingertips.iter().enumerate().map(facts).collect()
+}
+
+/// The capsules.
+pub(super) fn capsules(file: &HandFile) -> Vec<CapsuleFacts> {
+    let facts = |(k, capsule): (usize, &CapsuleFile)| CapsuleFacts {
+        number: k + 1,
+        link: capsule.link.clone(),
+        length_m: (Vector3::from(capsule.to_m) - Vector3::from(capsule.from_m)).norm(),
+        radius_m: capsule.radius_m,
+    };
+    file.capsules.iter().enumerate().map(facts).collect()
 }
 
 /// Returns the reach of each fingertip.

@@ -22,7 +22,7 @@ use serde::Serialize;
 use specimen::Specimen;
 use std::ffi::OsStr;
 
-pub use facts::{FingertipFacts, JointFacts, Masses, MeetingFacts, MeetingsFacts, Reach};
+pub use facts::{CapsuleFacts, FingertipFacts, JointFacts, Masses, MeetingFacts, MeetingsFacts, Reach};
 
 /// The findings of a check of a hand. `--json` prints it.
 #[derive(Clone, Debug, Serialize)]
@@ -39,6 +39,8 @@ pub struct HandCheck {
     pub joints: Vec<JointFacts>,
     /// The fingertips.
     pub fingertips: Vec<FingertipFacts>,
+    /// The capsules.
+    pub capsules: Vec<CapsuleFacts>,
     /// The reach of the fingertips; empty where the tree is not known.
     pub reach: Vec<Reach>,
     /// The masses of the links; `None` where the tree is not known.
@@ -102,6 +104,7 @@ impl HandCheck {
         Self {
             joints: facts::joints(&file, specimen),
             fingertips: facts::fingertips(&file, specimen),
+            capsules: facts::capsules(&file),
             reach: specimen.map_or(Vec::new(), facts::reaches),
             masses: specimen.map(facts::masses),
             meeting: meetings,
@@ -150,6 +153,7 @@ fn look(specimen: &Specimen, meetings: &meeting::Meetings, found: &mut Found) {
         shape::size,
         shape::freedom,
         shape::overlaps,
+        shape::crossings,
         drive::torques,
         drive::speeds,
         drive::encoders,

@@ -41,7 +41,8 @@ fn branch(check: &HandCheck, joint: Option<usize>, indent: &str, text: &mut Stri
     let carried: Vec<usize> = (0..check.joints.len()).filter(|&k| parent(k) == joint).collect();
     let name = joint.map(|k| check.joints[k].name.as_str());
     let tips: Vec<_> = check.fingertips.iter().filter(|tip| Some(tip.link.as_str()) == name).collect();
-    let count = carried.len() + tips.len();
+    let capsules: Vec<_> = check.capsules.iter().filter(|capsule| capsule.link.as_deref() == name).collect();
+    let count = carried.len() + tips.len() + capsules.len();
     let mut shown = 0;
     let mut line = |text: &mut String, words: String| {
         shown += 1;
@@ -51,6 +52,10 @@ fn branch(check: &HandCheck, joint: Option<usize>, indent: &str, text: &mut Stri
     };
     for tip in tips {
         line(text, format!("fingertip {}, radius {}", tip.name, length(tip.radius_m)));
+    }
+    for capsule in capsules {
+        let (length_m, radius_m) = (length(capsule.length_m), length(capsule.radius_m));
+        line(text, format!("capsule {}, length {length_m}, radius {radius_m}", capsule.number));
     }
     for k in carried {
         let below = line(text, check.joints[k].name.clone());

@@ -5,6 +5,7 @@ use super::super::found::Found;
 use super::length;
 use crate::inspect::finding::{Finding, Severity};
 use crate::{HandFile, direction};
+use blindgrasp_body::Part;
 use nalgebra::Vector3;
 use std::f64::consts::TAU;
 
@@ -148,6 +149,10 @@ pub(in super::super) fn subject_of(file: &HandFile, key: &str) -> String {
     match name {
         Some((list, name)) => format!("{list} `{name}`"),
         None => match list {
+            Some("capsule") => match index {
+                Some(k) if k < file.capsules.len() => file.part_in_words(Part::Capsule(k)),
+                _ => String::new(),
+            },
             Some(table @ ("control" | "safety")) => format!("[{table}]"),
             _ => String::new(),
         },

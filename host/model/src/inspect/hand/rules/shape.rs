@@ -4,7 +4,9 @@ use super::super::found::Found;
 use super::super::meeting::Meetings;
 use super::super::specimen::Specimen;
 use super::{length, names};
+use crate::check::item;
 use crate::inspect::finding::{Finding, Severity};
+use blindgrasp_body::{Part, closest_of_lines, overlap_m, pairs};
 use nalgebra::Vector3;
 
 /// A finger longer than an arm, m, ...
@@ -156,7 +158,7 @@ fn cross(specimen: &Specimen, a: usize, b: usize) -> bool {
         theirs
             .iter()
             .enumerate()
-            .any(|(n, their)| !(starts && m == 0 && n == 0) && apart_m(our, their) < near)
+            .any(|(n, their)| !(starts && m == 0 && n == 0) && apart_m([our, their]) < near)
     })
 }
 
@@ -167,38 +169,50 @@ fn bones(specimen: &Specimen, finger: usize) -> Vec<[Vector3<f64>; 2]> {
     points.windows(2).map(|pair| [pair[0], pair[1]]).filter(|[from, to]| (to - from).norm() > 0.0).collect()
 }
 
-/// The distance between two segments, m.
-fn apart_m([p, q]: &[Vector3<f64>; 2], [r, s]: &[Vector3<f64>; 2]) -> f64 {
-    let (d, e, w) = (q - p, s - r, p - r);
-    let (a, b, c) = (d.norm_squared(), d.dot(&e), e.norm_squared());
-    let (f, g) = (d.dot(&w), e.dot(&w));
-    let determinant = a * c - b * b;
-    // On lines that are not parallel; then each parameter is brought into its segment, given the other.
-    let start =
-        if determinant > 1e-12 * a * c { ((b * g - c * f) / determinant).clamp(0.0, 1.0) } else { 0.0 };
-    let other = ((b * start + g) / c).clamp(0.0, 1.0);
-    let start = ((b * other - f) / a).clamp(0.0, 1.0);
-    (w + d * start - e * other).norm()
+/// The distance between two lines, m.
+fn apart_m([p, q]: [&[Vector3<f64>; 2]; 2]) -> f64 {
+    let [s, t] = closest_of_lines([p, q]);
+    (p[0] + (p[1] - p[0]) * s - q[0] - (q[1] - q[0]) * t).norm()
 }
 
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn distances_of_segments() {
-        let x = [Vector3::zeros(), Vector3::x()];
-        let cases = [
-            ([Vector3::new(0.5, -1.0, 0.3), Vector3::new(0.5, 1.0, 0.3)], 0.3),
-            ([Vector3::new(0.2, 0.1, 0.0), Vector3::new(0.9, 0.1, 0.0)], 0.1),
-            ([Vector3::new(2.0, 0.0, 0.0), Vector3::new(3.0, 0.0, 0.0)], 1.0),
-            ([Vector3::new(2.0, 1.0, 0.0), Vector3::new(2.0, -1.0, 0.0)], 1.0),
-            ([Vector3::new(-1.0, 0.0, 1.0), Vector3::new(-1.0, 0.0, 2.0)], 2.0_f64),
-        ];
-        for (other, expected) in cases {
-            let expected = if expected == 2.0 { 2.0_f64.powf(0.5) } else { expected };
-            assert!((apart_m(&x, &other) - expected).abs() < 1e-12, "{other:?}");
-            assert!((apart_m(&other, &x) - expected).abs() < 1e-12, "{other:?}");
+/// Links, palm and fingertips inside each other at the nominal posture.
+pub(in super::super) fn crossings(specimen: &Specimen, found: &mut Found) {
+    let keys = [
+        "offset_m",
+        "axis",
+        "rotation_rpy_rad",
+        "limits_rad",
+        "radius_m",
+        "nominal_rad",
+        "from_m",
+        "to_m",
+        "link",
+    ];
+    if !found.trusts(&keys) {
+        return;
+    }
+    let (file, hand) = (&specimen.file, &specimen.hand);
+    let capsules = file.capsules(hand);
+    for parts in pairs(hand, &capsules) {
+        // Of two fingertips there is a rule of its own.
+        let Some(Part::Capsule(number)) = parts.into_iter().rfind(|part| matches!(part, Part::Capsule(_)))
+        else {
+            continue;
+        };
+        let overlap = overlap_m(parts, hand, &specimen.posture, &capsules);
+        if overlap > 0.0 {
+            let own = Part::Capsule(number);
+            let other = if parts[0] == own { parts[1] } else { parts[0] };
+            let what = format!(
+                "overlaps {} by {} at the nominal posture",
+                file.part_in_words(other),
+                length(overlap)
+            );
+            let remedy = "correct the capsules or nominal_rad: where links touch, no scene begins so";
+            let finding = Finding::new(Severity::Warning, what, remedy)
+                .about(file.part_in_words(own))
+                .key(item("capsule", number, "from_m"));
+            found.push(finding);
         }
     }
 }

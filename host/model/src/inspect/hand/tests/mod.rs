@@ -77,7 +77,7 @@ fn json_has_these_keys() {
     let check = serde_json::to_value(HandCheck::load("three-finger").unwrap()).unwrap();
     assert_eq!(
         keys(&check),
-        "counts description findings fingertips joints masses meeting name reach verdict"
+        "capsules counts description findings fingertips joints masses meeting name reach verdict"
     );
     assert_eq!(
         keys(&check["joints"][0]),
