@@ -39,7 +39,7 @@ fn warnings_are_told_and_allowed_errors_are_not() {
         text(&output.stdout).contains("antiparallel")
             && text(&output.stdout).ends_with("doubtful: 1 warning\n")
     );
-    let broken = hand(&folder, "0.064]", "64.0]");
+    let broken = hand(&folder, "offset_m = [0.0, 0.0, 0.064]", "offset_m = [0.0, 0.0, 64.0]");
     let output = check(&["--json", &broken]);
     assert_eq!(output.status.code(), Some(1));
     let check: Value = serde_json::from_slice(&output.stdout).expect("one JSON object");

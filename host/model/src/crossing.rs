@@ -1,13 +1,16 @@
-//! Parts of a hand that are inside each other or inside a table at the start, where nothing could come from.
+//! Parts of a hand that are inside each other, the object or a table at the start, where nothing gets by itself.
 
-use super::HandFile;
 use super::check::{Result, fail, item};
 use super::file::TableFile;
+use super::{HandFile, Start};
+use blindgrasp_body::polyhedron::{Polyhedron, Touchable};
 use blindgrasp_body::{Capsule, Hand, Part, Posture, overlap_m, pairs};
 use nalgebra::Vector3;
 
 /// The key by which links touch.
 const KEY: &str = "plant.links";
+/// What to do where they can't.
+const REMEDY: &str = "move contacts or object, correct the hand's capsules, or set it to false";
 
 impl HandFile {
     /// A part of the hand in words.
@@ -43,14 +46,31 @@ impl Posed<'_> {
                 [Part::Fingertip(_), Part::Fingertip(second)] => {
                     fail(item("contact", second, "point_m"), problem, "move the contacts apart")
                 }
-                _ => fail(
-                    KEY,
-                    problem,
-                    "move contacts or object, correct the hand's capsules, or set it to false",
-                ),
+                _ => fail(KEY, problem, REMEDY),
             };
         }
         Ok(())
+    }
+
+    /// Checks that links and palm are outside the object.
+    pub(super) fn are_outside(&self, shape: &Polyhedron, start: &Start) -> Result<()> {
+        if self.capsules.is_empty() {
+            return Ok(());
+        }
+        let (object, to_object) = (Touchable::of(shape), start.attitude.inverse());
+        let depth_m = |number: usize| {
+            let ends_m = Part::Capsule(number).ends_m(self.posture, self.capsules);
+            let [nearest, _] = object.supports(&ends_m.map(|end_m| to_object * (end_m - start.position_m)));
+            self.capsules[number].radius_m - nearest.closest.distance_m
+        };
+        let depths = (0..self.capsules.len()).map(|number| (depth_m(number), number));
+        match depths.max_by(|a, b| a.0.total_cmp(&b.0)) {
+            Some((depth_m, number)) if depth_m > 0.0 => {
+                let name = self.file.part_in_words(Part::Capsule(number));
+                fail(KEY, format!("{name} is {:.3} mm inside the object at the start", depth_m * 1e3), REMEDY)
+            }
+            _ => Ok(()),
+        }
     }
 
     /// Checks that nothing is inside a table that could touch it: the base does not.

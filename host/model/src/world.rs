@@ -138,7 +138,8 @@ pub(super) fn at_start(file: &SceneFile, parts: &Parts, start: &Start) -> Result
             return fail(item("plant.table", t, "point_m"), problem, "move the table or the object's pose");
         }
     }
-    posed.are_apart()
+    posed.are_apart()?;
+    posed.are_outside(shape, start)
 }
 
 /// Tells an object that is too heavy for the softness of tables.

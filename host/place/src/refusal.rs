@@ -82,7 +82,7 @@ pub(super) struct Count {
     pub(super) at_stop: Tally<Miss>,
     /// At which fingertips overlap (m), or meet another part of the object (m).
     pub(super) overlap: Tally<Miss>,
-    /// At which links would be inside each other, a fingertip or the palm (m).
+    /// At which links would be inside each other, a fingertip, the palm or the object (m).
     pub(super) cross: Tally<Miss>,
     /// At which a fingertip would touch with its back.
     pub(super) back: Tally<Miss>,
@@ -99,7 +99,7 @@ impl Count {
             Miss::Unreachable(by) => self.unreachable.add(by.distance_m, miss),
             Miss::AtStop(_) => self.at_stop.add(0.0, miss),
             Miss::Overlap(_, _, by) | Miss::Beside(_, by) => self.overlap.add(by, miss),
-            Miss::Cross(_, by) => self.cross.add(by, miss),
+            Miss::Cross(_, by) | Miss::Inside(_, by) => self.cross.add(by, miss),
             Miss::Back(_, cosine) => self.back.add(-cosine, miss),
             Miss::Through(_) | Miss::TipThrough(_) => self.through.add(0.0, miss),
         }
@@ -134,7 +134,7 @@ impl Count {
             (&self.unreachable, "tried, but a fingertip does not quite get there"),
             (&self.at_stop, "tried, but a joint would stand at its end stop"),
             (&self.overlap, "tried, but a fingertip would be in the way"),
-            (&self.cross, "tried, but links would be in each other's way"),
+            (&self.cross, "tried, but links would be in each other's way, or the object's"),
             (&self.back, "tried, but a fingertip would touch with its back"),
             (&self.through, "tried, but a finger would pass through the object"),
         ];
@@ -248,6 +248,9 @@ impl Words<'_> {
                 let [a, b] = parts.map(|part| self.hand.part_in_words(part));
                 format!("{a} and {b} would overlap by {:.1} mm", by * 1e3)
             }
+            Miss::Inside(part, by) => {
+                format!("{} would be {:.1} mm inside the object", self.hand.part_in_words(part), by * 1e3)
+            }
             Miss::Back(i, _) => format!("fingertip `{}` would touch with its back", fingertip(i)),
             Miss::Through(k) => {
                 format!("the bone to joint `{}` would pass through the object", self.hand.joints[k].name)
@@ -293,6 +296,10 @@ mod tests {
             (
                 Miss::Cross([Part::Capsule(3), Part::Capsule(7)], 0.0021),
                 "link `finger-1-flex-1` (capsule 4) and link `finger-2-flex-2` (capsule 8) would overlap by 2.1 mm",
+            ),
+            (
+                Miss::Inside(Part::Capsule(5), 0.0301),
+                "link `finger-1-flex-3` (capsule 6) would be 30.1 mm inside the object",
             ),
             (Miss::Back(2, -0.3), "fingertip `finger-3` would touch with its back"),
             (Miss::Through(3), "the bone to joint `finger-1-flex-3` would pass through the object"),

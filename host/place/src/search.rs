@@ -202,6 +202,8 @@ fn take(task: &Task<'_>, stance: &Stance) -> Result<f64, Miss> {
         capsules: &parts.capsules,
         pairs: &task.pairs,
         nominal_rad: &task.request.reach.nominal_rad,
+        object: &task.object,
+        object_radius_m: task.object_radius_m,
     };
     stance::take(&taker, &parts.object.shape, stance)
 }

@@ -2,8 +2,8 @@
 
 use super::position::FACING;
 use blindgrasp_body::inverse_kinematics::{Unreachable, own_joints, place};
-use blindgrasp_body::polyhedron::Polyhedron;
-use blindgrasp_body::{Capsule, Hand, Part, Posture, overlap_m};
+use blindgrasp_body::polyhedron::{Polyhedron, Touchable};
+use blindgrasp_body::{Capsule, Hand, Part, Posture, closest_of_lines, overlap_m};
 use blindgrasp_model::posture;
 use nalgebra::{UnitQuaternion, Vector3};
 
@@ -44,6 +44,8 @@ pub(super) enum Miss {
     Beside(usize, f64),
     /// Two parts of the hand of which one is no fingertip are inside each other, by so many metres.
     Cross([Part; 2], f64),
+    /// A link or the palm is inside the object, by so many metres.
+    Inside(Part, f64),
 }
 
 /// The hand that takes a stance.
@@ -55,6 +57,10 @@ pub(super) struct Taker<'a> {
     /// The parts that may not be inside each other, besides two fingertips.
     pub(super) pairs: &'a [[Part; 2]],
     pub(super) nominal_rad: &'a [f64],
+    /// The object's surface.
+    pub(super) object: &'a Touchable,
+    /// Largest distance of a point of the object from its centre of mass, m.
+    pub(super) object_radius_m: f64,
 }
 
 /// The pairs of parts that may touch and of which one is no fingertip.
@@ -95,6 +101,7 @@ pub(super) fn take(taker: &Taker<'_>, shape: &Polyhedron, stance: &Stance) -> Re
     }
     through(hand, &posture, shape, stance)?;
     apart(taker, &posture)?;
+    outside(taker, &posture, stance)?;
     let (room_rad, joint) = room(hand, &angles);
     if room_rad > 0.0 { Ok(room_rad) } else { Err(Miss::AtStop(joint)) }
 }
@@ -104,6 +111,25 @@ fn apart(taker: &Taker<'_>, posture: &Posture) -> Result<(), Miss> {
     taker.pairs.iter().try_for_each(|&parts| {
         let overlap = overlap_m(parts, taker.hand, posture, taker.capsules);
         if overlap > -CLEAR_M { Err(Miss::Cross(parts, overlap)) } else { Ok(()) }
+    })
+}
+
+/// Checks that links and palm are outside the object.
+fn outside(taker: &Taker<'_>, posture: &Posture, stance: &Stance) -> Result<(), Miss> {
+    (0..taker.capsules.len()).try_for_each(|number| {
+        let part = Part::Capsule(number);
+        let ends_m = part
+            .ends_m(posture, taker.capsules)
+            .map(|end_m| stance.attitude.inverse() * (end_m - stance.position_m));
+        let radius_m = taker.capsules[number].radius_m;
+        let [share, _] = closest_of_lines([&ends_m, &[Vector3::zeros(); 2]]);
+        let nearest_m = (ends_m[0] + (ends_m[1] - ends_m[0]) * share).norm();
+        if nearest_m > taker.object_radius_m + radius_m + CLEAR_M {
+            return Ok(());
+        }
+        let [nearest, _] = taker.object.supports(&ends_m);
+        let depth = radius_m - nearest.closest.distance_m;
+        if depth > -CLEAR_M { Err(Miss::Inside(part, depth)) } else { Ok(()) }
     })
 }
 

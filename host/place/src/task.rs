@@ -5,6 +5,7 @@ use super::facet::Facet;
 use super::points::Fingertips;
 use super::rolling::{Gains, Rolling};
 use super::{NARROWEST, Request, SPARE, attitude, stance};
+use blindgrasp_body::polyhedron::Touchable;
 use blindgrasp_body::{MAX_FINGERS, Part};
 use blindgrasp_model::{SceneError, posture};
 use blindgrasp_shared::math::Real;
@@ -44,6 +45,10 @@ pub(super) struct Task<'a> {
     pub(super) attitudes: Vec<UnitQuaternion<f64>>,
     /// The pairs of parts that may not be inside each other, besides two fingertips.
     pub(super) pairs: Vec<[Part; 2]>,
+    /// The object's surface.
+    pub(super) object: Touchable,
+    /// Largest distance of a point of the object from its centre of mass, m.
+    pub(super) object_radius_m: f64,
 }
 
 impl<'a> Task<'a> {
@@ -107,6 +112,8 @@ impl<'a> Task<'a> {
             nominal_m: centres.iter().map(|centre| centre - middle).collect(),
             attitudes,
             pairs: stance::pairs(hand, &request.parts.capsules),
+            object: Touchable::of(shape),
+            object_radius_m: shape.radius_m(),
         })
     }
 

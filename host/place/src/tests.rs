@@ -2,7 +2,7 @@
 
 use super::*;
 use blindgrasp_body::polyhedron::Polyhedron;
-use blindgrasp_model::file::{ContactFile, Indentation, PoseFile, ShapeFile};
+use blindgrasp_model::file::{CapsuleFile, ContactFile, Indentation, PoseFile, ShapeFile};
 use blindgrasp_model::{HandFile, ObjectFile};
 use nalgebra::Vector3;
 use std::path::Path;
@@ -341,8 +341,20 @@ fn links_may_not_be_inside_each_other() {
         Case::of(case)
     };
     let refusal = with(0.035, None).refusal();
-    let links = refusal.tests.iter().find(|test| test.what.contains("links would be in each other's way"));
-    assert!(links.is_some_and(|test| test.nearest.contains("would overlap by")), "{refusal}");
+    let links = |refusal: &Refusal| {
+        refusal
+            .tests
+            .iter()
+            .find(|test| test.what.contains("links would be"))
+            .map(|test| test.nearest.clone())
+    };
+    assert!(links(&refusal).is_some_and(|nearest| nearest.contains("would overlap by")), "{refusal}");
+    // Nor inside the object: around the fingertip, into the face that it touches.
+    let mut into_object = Case::new("three-finger", "cube").like;
+    let link = into_object.hand.capsules.swap_remove(5);
+    into_object.hand.capsules = vec![CapsuleFile { radius_m: 0.016, ..link }];
+    let refusal = Case::of(into_object).refusal();
+    assert!(links(&refusal).is_some_and(|nearest| nearest.contains("inside the object")), "{refusal}");
     let mut none = Case::new("three-finger", "cube").like;
     none.hand.capsules.clear();
     let place = |case: Case| case.place(1).unwrap().remove(0).scene.file;

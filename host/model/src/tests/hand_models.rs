@@ -239,3 +239,14 @@ fn gains_of_the_hand_do_not_act_in_a_scene() {
     // But what the firmware of its hand is, a scene still knows.
     assert_eq!(HandModel::of(&scene).unwrap(), HandModel::load("three-finger").unwrap());
 }
+
+/// Surfaces are no part of what a firmware is built with.
+#[test]
+fn capsules_change_no_firmware() {
+    for name in HandFile::built_in() {
+        let (model, mut file) = HandModel::load_with_file(name).unwrap();
+        assert!(!file.capsules.is_empty());
+        file.capsules.clear();
+        assert_eq!(HandModel::build(&file).unwrap().bytes(), model.bytes(), "{name}");
+    }
+}

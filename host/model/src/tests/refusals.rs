@@ -151,6 +151,13 @@ fn links_may_be_inside_each_other_where_they_do_not_touch() {
     assert!(rolling.warnings[0].starts_with("fingertips `finger-1` and `finger-2` overlap"));
     crossing.push("plant.links=false");
     assert_eq!(load("cube-table", &crossing).unwrap_err().key, "contact.2.point_m");
+    let into_object = "hand.capsule.6.radius_m=0.018";
+    let error = load("over-an-edge", &[into_object]).unwrap_err();
+    assert!(
+        error.problem.starts_with("link `finger-1-flex-3` (capsule 6) is ") && error.key == "plant.links"
+    );
+    assert!(error.problem.ends_with(" mm inside the object at the start"), "{error}");
+    assert!(load("over-an-edge", &[into_object, "plant.links=false"]).is_ok());
     // A palm touches no table.
     assert!(
         load("cube-table", &["hand.capsule.1.from_m=[0, -1, 1]", "hand.capsule.1.to_m=[0, -1, 1]"]).is_ok()
