@@ -25,7 +25,19 @@ use std::f64::consts::PI;
 const LARGEST: f64 = 1e6;
 
 /// The most capsules that a hand may have: each pair of them is looked at in each step.
-const MAX_CAPSULES: usize = 64;
+pub(crate) const MAX_CAPSULES: usize = 64;
+
+/// Bounds on the radius of a capsule, m, ...
+const THINNEST_M: f64 = 1e-4;
+const THICKEST_M: f64 = 1.0;
+/// ... and on the coordinates of its ends.
+const FARTHEST_M: f64 = 10.0;
+
+/// Returns `true` for the ends and the radius of a capsule that a hand may have, m.
+pub(crate) fn is_capsule(ends_m: &[Vector3<f64>; 2], radius_m: f64) -> bool {
+    let is_near = |v: &f64| v.abs() <= FARTHEST_M;
+    ends_m.iter().all(|end_m| end_m.iter().all(is_near)) && (THINNEST_M..=THICKEST_M).contains(&radius_m)
+}
 
 /// A hand's file, checked from end to end.
 pub(crate) struct Examined {
@@ -237,9 +249,9 @@ fn check_capsules(file: &HandFile, refused: &mut Refused) {
             refused.take::<()>(fail(key("link"), problem, suggestion(link, known)));
         }
         refused.take_all([
-            all_within(&key("from_m"), &capsule.from_m, 10.0),
-            all_within(&key("to_m"), &capsule.to_m, 10.0),
-            within(&key("radius_m"), capsule.radius_m, 1e-4, 1.0),
+            all_within(&key("from_m"), &capsule.from_m, FARTHEST_M),
+            all_within(&key("to_m"), &capsule.to_m, FARTHEST_M),
+            within(&key("radius_m"), capsule.radius_m, THINNEST_M, THICKEST_M),
             within(&key("friction"), capsule.friction.unwrap_or_default(), 0.0, 100.0),
         ]);
     }

@@ -328,8 +328,12 @@ pub(super) fn is_path(name: &OsStr) -> bool {
 /// Fills in a hand's URDF, and spreads its defaults.
 fn complete_hand(node: &mut Node, home: &Home, notices: &mut Vec<Finding>) -> Result<(), SceneError> {
     node.spread_defaults("fingertip");
-    node.spread_defaults("capsule");
+    // Those of the URDF come later.
+    if node.get("capsule").is_some() {
+        node.spread_defaults("capsule");
+    }
     urdf::expand(node, home, notices)?;
+    node.spread_defaults("capsule");
     node.spread_defaults("joint");
     Ok(())
 }

@@ -221,7 +221,8 @@ fn moments(inertia: &Matrix3<f64>) -> [f64; 6] {
     [i.m11, i.m22, i.m33, i.m12, i.m13, i.m23]
 }
 
-fn number(value: f64, place: &Place) -> Node {
+/// A number.
+pub(super) fn number(value: f64, place: &Place) -> Node {
     Node { value: Value::Float(value), place: place.clone() }
 }
 

@@ -3,16 +3,19 @@
 use super::super::check::{Result, fail, item};
 use super::super::error::{Place, SceneError, suggestion};
 use super::super::file::FingertipFile;
+use super::super::hand::{MAX_CAPSULES, is_capsule};
 use super::super::inspect::finding::Finding;
 use super::super::library::Home;
 use super::super::read::read;
 use super::super::tree::{Entry, Node, Value};
 use super::assembly::{Assembly, Moving, Seat};
-use super::complete::{Oddities, complete, list, text};
+use super::complete::{Oddities, complete, list, number, text};
 use super::keys::Keys;
 use super::robot::{Joint, Kind, Robot};
+use super::shape::{Round, Shape, capsules};
 use super::topology::Tree;
 use super::xml::quote;
+use nalgebra::Vector3;
 
 /// The file that a hand's `[urdf]` names.
 pub(crate) fn file_of(hand: &Node) -> Option<&Node> {
@@ -61,7 +64,12 @@ pub(crate) fn expand(hand: &mut Node, home: &Home, notices: &mut Vec<Finding>) -
     }
     let assembly = Assembly::new(&robot, &tree, &keys, &tips, notices).map_err(at_key)?;
     let hand_parts = Parts { robot: &robot, assembly: &assembly, keys: &keys, place: &place };
-    hand_parts.seat_fingertips(hand, &fingertips, &tips)?;
+    let centres_m = hand_parts.seat_fingertips(hand, &fingertips, &tips)?;
+    if hand.get("capsule").is_some() {
+        hand_parts.seat_capsules(hand)?;
+    } else {
+        notices.extend(hand_parts.add_capsules(hand, &fingertips, &centres_m));
+    }
     hand_parts.add_joints(hand, notices)
 }
 
@@ -85,8 +93,14 @@ impl Parts<'_> {
         &self.joint(&self.assembly.joints[index]).name
     }
 
-    /// Fingertips move from their links to the joints that carry them.
-    fn seat_fingertips(&self, hand: &mut Node, fingertips: &[FingertipFile], tips: &[usize]) -> Result<()> {
+    /// Fingertips move from their links to the joints that carry them; returns these joints and their centres there, m.
+    fn seat_fingertips(
+        &self,
+        hand: &mut Node,
+        fingertips: &[FingertipFile],
+        tips: &[usize],
+    ) -> Result<Vec<(usize, Vector3<f64>)>> {
+        let mut centres_m = Vec::with_capacity(tips.len());
         for (i, (fingertip, &link)) in fingertips.iter().zip(tips).enumerate() {
             let key = item("fingertip", i, "link");
             let seat = self.assembly.seats[link];
@@ -102,12 +116,102 @@ impl Parts<'_> {
             if let Some(link) = node.get_mut("link") {
                 link.value = Value::String(self.name(joint).into());
             }
+            let mut centre_m = Vector3::from(fingertip.offset_m);
             if let (Some(frame), Some(offset)) = (frame, node.get_mut("offset_m")) {
                 let place = offset.place.clone();
-                *offset = list(&frame.point(&fingertip.offset_m.into()).into(), &place);
+                centre_m = frame.point(&centre_m);
+                *offset = list(&centre_m.into(), &place);
+            }
+            centres_m.push((joint, centre_m));
+        }
+        Ok(centres_m)
+    }
+
+    /// The file's own capsules move from their links to the joints that carry them.
+    fn seat_capsules(&self, hand: &mut Node) -> Result<()> {
+        let Some(Node { value: Value::Array(items), .. }) = hand.get_mut("capsule") else { return Ok(()) };
+        for (k, node) in items.iter_mut().enumerate() {
+            let Some(Entry { node: link, .. }) = node.take("link") else { continue };
+            let key = item("capsule", k, "link");
+            let name: String = read(&link, &key)?;
+            let fail =
+                |problem: String, remedy: String| Err(SceneError::new(&key, problem, remedy).at(&link.place));
+            let Some(index) = self.robot.link_index(&name) else {
+                let problem = format!("{} has no link `{}`", self.keys.file, quote(&name));
+                return fail(problem, self.robot.link_suggestion(&name));
+            };
+            let Some(Seat { joint, frame }) = self.assembly.seats[index] else {
+                let problem = format!("link `{}` is not below the base", quote(&name));
+                return fail(problem, "choose a link of the hand, or another base ([urdf])".into());
+            };
+            if let Some(joint) = joint {
+                node.insert("link", text(self.name(joint), &link.place));
+            }
+            for end in ["from_m", "to_m"] {
+                if let (Some(frame), Some(node)) = (frame, node.get_mut(end)) {
+                    let end_m: [f64; 3] = read(node, &item("capsule", k, end))?;
+                    *node = list(&frame.point(&end_m.into()).into(), &node.place);
+                }
             }
         }
         Ok(())
+    }
+
+    /// The array `capsule`: what stands for the shapes of the URDF that touch. What can't be used is told.
+    fn add_capsules(
+        &self,
+        hand: &mut Node,
+        fingertips: &[FingertipFile],
+        centres_m: &[(usize, Vector3<f64>)],
+    ) -> Option<Finding> {
+        let mut items = Vec::new();
+        let mut beyond = 0;
+        for (link, seat) in self.robot.links.iter().zip(&self.assembly.seats) {
+            let Some(Seat { joint, frame }) = *seat else { continue };
+            let shapes: Vec<Shape> = link
+                .shapes
+                .iter()
+                .filter(|shape| shape.is_collision)
+                .map(|shape| frame.map_or(*shape, |frame| shape.seen_from(&frame)))
+                .collect();
+            let on_it = fingertips.iter().zip(centres_m).filter(|(_, (carrier, _))| Some(*carrier) == joint);
+            let on_it: Vec<_> = on_it.map(|(tip, (_, centre_m))| (*centre_m, tip.radius_m)).collect();
+            for Round { ends_m: [from_m, to_m], radius_m } in capsules(&shapes, &on_it) {
+                if !is_capsule(&[from_m, to_m], radius_m) {
+                    beyond += 1;
+                    continue;
+                }
+                let mut node = Node { value: Value::Table(Vec::new()), place: link.place.clone() };
+                if let Some(joint) = joint {
+                    node.insert("link", text(self.name(joint), &link.place));
+                }
+                node.insert("from_m", list(&from_m.into(), &link.place));
+                node.insert("to_m", list(&to_m.into(), &link.place));
+                node.insert("radius_m", number(radius_m, &link.place));
+                items.push(node);
+            }
+        }
+        let told = |what: String| {
+            Some(Finding::notice(&self.robot.place, what, "give the hand's file [[capsule]]s of its own"))
+        };
+        let count = items.len();
+        if count > MAX_CAPSULES {
+            return told(format!(
+                "its <collision> shapes make {count} capsules, of which a hand may have {MAX_CAPSULES}: links touch nothing"
+            ));
+        }
+        if count > 0 {
+            hand.insert("capsule", Node { value: Value::Array(items), place: self.place.clone() });
+        }
+        match beyond {
+            0 => None,
+            1 => told(
+                "a capsule of its <collision> shapes is too small or too large: it touches nothing".into(),
+            ),
+            _ => told(format!(
+                "{beyond} capsules of its <collision> shapes are too small or too large: they touch nothing"
+            )),
+        }
     }
 
     /// The array `joint`: in its own order if it is there, else in the tree's.

@@ -1,10 +1,13 @@
-//! A hand as a URDF: links with their masses, joints, fingertips as spheres, and bones that viewers can show.
+//! A hand as a URDF: links with their masses and surfaces, joints, and fingertips as spheres.
+//!
+//! URDF has no word for a capsule: it is a cylinder with a sphere on each end, as which it is read again. A hand without surfaces
+//! gets bones that viewers can show.
 //!
 //! Numbers have the fewest digits that give back every bit, so that the hand can be read again as it was. Each joint's link is
 //! called after it; each fingertip is a link of its own, fixed where the fingertip's centre is. What URDF knows nothing of
 //! (gains, encoders, stiffness of the fingertips) is left out.
 
-use super::super::file::{FingertipFile, HandFile, InertiaFile, JointFile};
+use super::super::file::{CapsuleFile, FingertipFile, HandFile, InertiaFile, JointFile};
 use nalgebra::Vector3;
 use std::fmt::Write as _;
 
@@ -143,22 +146,36 @@ impl<'a> Export<'a> {
     }
 
     fn base(&mut self) {
-        let bones = bones(self.hand, None);
-        if bones.is_empty() {
-            self.line(1, format!("<link name=\"{BASE}\"/>"));
-        } else {
-            self.line(1, format!("<link name=\"{BASE}\">"));
-            self.visuals(&bones);
-            self.line(1, "</link>".into());
-        }
+        self.line(1, format!("<link name=\"{BASE}\">"));
+        self.surface(None);
+        self.line(1, "</link>".into());
     }
 
     fn link(&mut self, k: usize, joint: &JointFile) {
         self.line(1, format!("<link name=\"{}\">", escaped(&self.names.links[k])));
         self.inertial(inertia(joint), &joint.mass_centre_m);
-        let bones = bones(self.hand, Some(&joint.name));
-        self.visuals(&bones);
+        self.surface(Some(&joint.name));
         self.line(1, "</link>".into());
+    }
+
+    /// The capsules of a link, or its bones in a hand without capsules.
+    fn surface(&mut self, link: Option<&str>) {
+        let hand = self.hand;
+        if hand.capsules.is_empty() {
+            for (end, radius_m) in bones(hand, link) {
+                self.cylinder("visual", [Vector3::zeros(), end], radius_m);
+            }
+        }
+        let on_it = |capsule: &&CapsuleFile| capsule.link.as_deref() == link;
+        for CapsuleFile { from_m, to_m, radius_m, .. } in hand.capsules.iter().filter(on_it) {
+            for tag in ["visual", "collision"] {
+                if from_m != to_m {
+                    self.cylinder(tag, [*from_m, *to_m].map(Vector3::from), *radius_m);
+                    self.solid(tag, from_m, None, &format!("<sphere radius=\"{radius_m:?}\"/>"));
+                }
+                self.solid(tag, to_m, None, &format!("<sphere radius=\"{radius_m:?}\"/>"));
+            }
+        }
     }
 
     fn inertial(&mut self, (mass_kg, moments): (f64, [f64; 6]), centre_m: &[f64; 3]) {
@@ -214,22 +231,28 @@ impl<'a> Export<'a> {
         self.line(1, "</joint>".into());
     }
 
-    fn visuals(&mut self, bones: &[(Vector3<f64>, f64)]) {
-        for (end, radius) in bones {
-            let length = end.norm();
-            // The axis z of a cylinder, turned into the bone.
-            let across = blindgrasp_shared::math::norm(&Vector3::new(end.x, end.y, 0.0));
-            let rpy = [0.0, libm::atan2(across, end.z), libm::atan2(end.y, end.x)];
-            let middle: [f64; 3] = (end * 0.5).into();
-            let lines = [
-                "<visual>".into(),
-                format!("  <origin xyz=\"{}\" rpy=\"{}\"/>", numbers(&middle), numbers(&rpy)),
-                format!("  <geometry><cylinder radius=\"{radius:?}\" length=\"{length:?}\"/></geometry>"),
-                "  <material name=\"bone\"/>".into(),
-                "</visual>".into(),
-            ];
-            lines.into_iter().for_each(|line| self.line(2, line));
+    /// A cylinder between two points.
+    fn cylinder(&mut self, tag: &str, [from_m, to_m]: [Vector3<f64>; 2], radius_m: f64) {
+        let along = to_m - from_m;
+        let length = along.norm();
+        // The axis z of a cylinder, turned into the line.
+        let across = blindgrasp_shared::math::norm(&Vector3::new(along.x, along.y, 0.0));
+        let rpy = [0.0, libm::atan2(across, along.z), libm::atan2(along.y, along.x)];
+        let middle: [f64; 3] = (from_m + along * 0.5).into();
+        let cylinder = format!("<cylinder radius=\"{radius_m:?}\" length=\"{length:?}\"/>");
+        self.solid(tag, &middle, Some(&rpy), &cylinder);
+    }
+
+    /// A shape that is seen, or touches.
+    fn solid(&mut self, tag: &str, middle_m: &[f64; 3], rpy_rad: Option<&[f64; 3]>, solid: &str) {
+        let turned = rpy_rad.map_or(String::new(), |rpy| format!(" rpy=\"{}\"", numbers(rpy)));
+        self.line(2, format!("<{tag}>"));
+        self.line(3, format!("<origin xyz=\"{}\"{turned}/>", numbers(middle_m)));
+        self.line(3, format!("<geometry>{solid}</geometry>"));
+        if tag == "visual" {
+            self.line(3, "<material name=\"bone\"/>".into());
         }
+        self.line(2, format!("</{tag}>"));
     }
 }
 

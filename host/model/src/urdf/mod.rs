@@ -1,7 +1,7 @@
 //! Hands whose kinematics are in a URDF.
 //!
 //! A hand's file may name a URDF in a table `[urdf]`. [`expand`] puts what the URDF says into the configuration tree, as the
-//! `joint` and `fingertip` entries of an ordinary hand, each value with its place in the URDF. Everything behind it, from
+//! `joint`, `fingertip` and `capsule` entries of an ordinary hand, each value with its place in the URDF. Everything behind it, from
 //! `--set` to the firmware, sees an ordinary hand.
 //!
 //! ```text
@@ -23,6 +23,7 @@ pub(crate) mod export;
 mod keys;
 mod reader;
 mod robot;
+mod shape;
 mod starter;
 #[cfg(test)]
 mod tests;

@@ -2,7 +2,8 @@
 
 use super::super::error::{Place, SceneError, suggestion};
 use super::body::Body;
-use super::robot::{Dynamics, Joint, Kind, Limit, Link, Origin, Robot, Shape};
+use super::robot::{Dynamics, Joint, Kind, Limit, Link, Origin, Robot};
+use super::shape::{Shape, Solid};
 use super::transform::Transform;
 use super::xml::{Text, child, children, quote};
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
@@ -143,7 +144,8 @@ impl Reader<'_> {
             Some(inertial) => (self.body(&of, inertial), self.text.place(inertial)),
             None => (Ok(Body::none()), place.clone()),
         };
-        Ok(Link { name, place, body, body_place, shapes: self.shapes(element) })
+        let (shapes, left_out) = self.shapes(element);
+        Ok(Link { name, place, body, body_place, shapes, left_out })
     }
 
     fn body(&self, of: &str, inertial: Node<'_, '_>) -> Result<Body, SceneError> {
@@ -188,26 +190,39 @@ impl Reader<'_> {
         Ok(body.seen_from(&origin.transform))
     }
 
-    /// Returns the shapes of a link. They only help to guess fingertips, so that one which can't be read is left out.
-    fn shapes(&self, link: Node<'_, '_>) -> Vec<Shape> {
-        let shapes = children(link, "collision").chain(children(link, "visual"));
-        let shapes = shapes.filter_map(|shape| {
-            let solid = child(shape, "geometry")?.first_element_child()?;
-            let number = |name| Some(self.text.numbers::<1>("", solid, name).ok()??[0]);
-            let (word, radius_m) = match solid.tag_name().name() {
-                "sphere" => ("sphere", number("radius")?),
-                "capsule" => ("capsule", number("radius")?),
-                "cylinder" => ("cylinder", number("radius")?.min(0.5 * number("length")?)),
-                "box" => {
-                    let sides: [f64; 3] = self.text.numbers("", solid, "size").ok()??;
-                    ("box", 0.5 * sides.into_iter().fold(f64::INFINITY, f64::min))
+    /// Returns the shapes of a link, and says of each `<collision>` that is none of them what it is.
+    fn shapes(&self, link: Node<'_, '_>) -> (Vec<Shape>, Vec<String>) {
+        let (mut shapes, mut left_out) = (Vec::new(), Vec::new());
+        for (tag, is_collision) in [("collision", true), ("visual", false)] {
+            for element in children(link, tag) {
+                let solid = child(element, "geometry").and_then(|geometry| geometry.first_element_child());
+                let shape = solid.and_then(|solid| self.shape(element, solid, is_collision));
+                match shape {
+                    Some(shape) => shapes.push(shape),
+                    None if is_collision => left_out.push(match solid.map(|solid| solid.tag_name().name()) {
+                        None => "a <collision> without a shape".into(),
+                        Some("mesh") => "a mesh".into(),
+                        Some(tag) => format!("a <{}> that can't be read", quote(tag)),
+                    }),
+                    None => {}
                 }
-                _ => return None,
-            };
-            let centre_m = self.origin("", shape).ok()?.transform.offset_m;
-            (radius_m > 0.0).then_some(Shape { word, centre_m, radius_m })
-        });
-        shapes.collect()
+            }
+        }
+        (shapes, left_out)
+    }
+
+    /// A shape whose numbers can be read.
+    fn shape(&self, element: Node<'_, '_>, solid: Node<'_, '_>, is_collision: bool) -> Option<Shape> {
+        let length = |name| Some(self.text.numbers::<1>("", solid, name).ok()??[0]);
+        let solid = match solid.tag_name().name() {
+            "sphere" => Solid::Sphere { radius_m: length("radius")? },
+            "capsule" => Solid::Capsule { radius_m: length("radius")?, length_m: length("length")? },
+            "cylinder" => Solid::Cylinder { radius_m: length("radius")?, length_m: length("length")? },
+            "box" => Solid::Box { sides_m: self.text.numbers("", solid, "size").ok()?? },
+            _ => return None,
+        };
+        let shape = Shape { solid, pose: self.origin("", element).ok()?.transform, is_collision };
+        (shape.radius_m() > 0.0).then_some(shape)
     }
 
     fn origin(&self, of: &str, parent: Node<'_, '_>) -> Result<Origin, SceneError> {

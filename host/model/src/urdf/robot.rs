@@ -2,6 +2,7 @@
 
 use super::super::error::{Place, SceneError, suggestion};
 use super::body::Body;
+use super::shape::Shape;
 use super::transform::{Transform, roll_pitch_yaw};
 use nalgebra::Vector3;
 
@@ -23,19 +24,10 @@ pub(super) struct Link {
     pub(super) body: Result<Body, SceneError>,
     /// The place where that is written.
     pub(super) body_place: Place,
-    /// Its shapes, as far as no mesh is needed to know them.
+    /// Its shapes, as far as no mesh is needed to know them: those that touch, then those that are only seen.
     pub(super) shapes: Vec<Shape>,
-}
-
-/// A sphere, box, cylinder or capsule of a link.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Shape {
-    /// Its name.
-    pub(super) word: &'static str,
-    /// Its middle in the link's frame, m.
-    pub(super) centre_m: Vector3<f64>,
-    /// Radius of the largest sphere that fits into it, m.
-    pub(super) radius_m: f64,
+    /// The other shapes that touch, in words.
+    pub(super) left_out: Vec<String>,
 }
 
 /// A joint.

@@ -12,8 +12,8 @@ use std::path::PathBuf;
 
 /// Write a hand as a URDF that other tools load
 ///
-/// Links with their inertias, joints with limits and friction, fingertips as links of their own with a sphere, bones as
-/// cylinders. Numbers keep all their bits. Gains, encoders and the stiffness of the fingertips are not in it.
+/// Links with their inertias, joints with limits and friction, fingertips as links of their own with a sphere, capsules as
+/// a cylinder and two spheres; without any, bones as cylinders. Numbers keep all their bits. Gains, encoders and the stiffness of the fingertips are not in it.
 #[derive(Args)]
 pub(crate) struct Arguments {
     /// A built-in hand, or the path of a hand's file

@@ -7,7 +7,8 @@ use super::super::super::check::{Result, fail};
 use super::super::super::error::{Place, SceneError};
 use super::super::assembly::{Assembly, Seat};
 use super::super::keys::Keys;
-use super::super::robot::{Robot, Shape};
+use super::super::robot::Robot;
+use super::super::shape::{Shape, Solid};
 use super::super::topology::Tree;
 use super::super::transform::Transform;
 use super::super::xml::quote;
@@ -71,12 +72,12 @@ fn asked(robot: &Robot, wanted: &FingertipRequest) -> Result<Tip> {
     let sphere = spheres(robot, link).max_by(|a, b| reach(a).total_cmp(&reach(b)));
     let (offset_m, offset_from) = match (wanted.offset_m, sphere) {
         (Some(offset), _) => (offset.into(), ASKED),
-        (None, Some(sphere)) => (sphere.centre_m, "a sphere of the link"),
+        (None, Some(sphere)) => (sphere.centre_m(), "a sphere of the link"),
         (None, None) => (Vector3::zeros(), "the origin of the link"),
     };
     let (radius_m, radius_from) = match (wanted.radius_m, sphere) {
         (Some(radius), _) => (Some(radius), ASKED),
-        (None, Some(sphere)) => (Some(sphere.radius_m), "a sphere of the link"),
+        (None, Some(sphere)) => (Some(sphere.radius_m()), "a sphere of the link"),
         (None, None) => (None, SHARE),
     };
     Ok(Tip { link, offset_m, radius_m, offset_from, radius_from, is_end: false })
@@ -84,12 +85,12 @@ fn asked(robot: &Robot, wanted: &FingertipRequest) -> Result<Tip> {
 
 /// Returns the farthest distance of a shape from its link's origin, m.
 fn reach(shape: &Shape) -> f64 {
-    shape.centre_m.norm() + shape.radius_m
+    shape.centre_m().norm() + shape.radius_m()
 }
 
 /// The spheres of a link.
 fn spheres(robot: &Robot, link: usize) -> impl Iterator<Item = Shape> + '_ {
-    robot.links[link].shapes.iter().copied().filter(|shape| shape.word == "sphere")
+    robot.links[link].shapes.iter().copied().filter(|shape| matches!(shape.solid, Solid::Sphere { .. }))
 }
 
 /// The ends of the fingers, as far as anything tells them.
@@ -179,23 +180,31 @@ impl Finger<'_> {
 
     /// The shape that reaches furthest from the joint, of some links.
     fn outermost(&self, shapes: impl Iterator<Item = (usize, Shape)>) -> Option<(usize, Shape)> {
-        let reach =
-            |(link, shape): &(usize, Shape)| self.frame(*link).point(&shape.centre_m).norm() + shape.radius_m;
+        let reach = |(link, shape): &(usize, Shape)| {
+            self.frame(*link).point(&self.far_end_m(*link, shape)).norm() + shape.radius_m()
+        };
         shapes.max_by(|a, b| reach(a).total_cmp(&reach(b)))
+    }
+
+    /// The middle of a shape, of a capsule that of its end that is further from the joint, in the frame of its link, m.
+    fn far_end_m(&self, link: usize, shape: &Shape) -> Vector3<f64> {
+        let [a, b] = shape.ends_m();
+        let distance = |end_m: &Vector3<f64>| self.frame(link).point(end_m).norm();
+        if distance(&a) > distance(&b) { a } else { b }
     }
 
     /// A fingertip that is a sphere, if there is one: best of a link that is called a tip.
     fn with_a_sphere(&self) -> Option<Tip> {
         let of = |link: usize| {
-            let spheres = spheres(self.robot, link).filter(|sphere| sphere.radius_m >= MARKER_M);
+            let spheres = spheres(self.robot, link).filter(|sphere| sphere.radius_m() >= MARKER_M);
             spheres.map(move |shape| (link, shape))
         };
         let named = self.outermost(self.named().flat_map(of));
         let (link, sphere) = named.or_else(|| self.outermost(self.links.iter().copied().flat_map(of)))?;
         Some(Tip {
             link,
-            offset_m: sphere.centre_m,
-            radius_m: Some(sphere.radius_m),
+            offset_m: sphere.centre_m(),
+            radius_m: Some(sphere.radius_m()),
             offset_from: "a sphere of the link",
             radius_from: "a sphere of the link",
             is_end: false,
@@ -229,16 +238,15 @@ impl Finger<'_> {
             .iter()
             .flat_map(|&link| self.robot.links[link].shapes.iter().map(move |shape| (link, *shape)));
         if let Some((link, shape)) = self.outermost(shapes)
-            && self.frame(link).point(&shape.centre_m).norm() > SAME_PLACE_M
+            && let offset_m = self.far_end_m(link, &shape)
+            && self.frame(link).point(&offset_m).norm() > SAME_PLACE_M
         {
-            return Ok(Tip {
-                link,
-                offset_m: shape.centre_m,
-                radius_m: Some(shape.radius_m),
-                offset_from: "the middle of a box, cylinder or capsule of the link",
-                radius_from: "half the least thickness of the same",
-                is_end: false,
-            });
+            let (offset_from, radius_from) = match shape.solid {
+                Solid::Capsule { .. } => ("the end of a capsule of the link", "that of the same"),
+                _ => ("the middle of a box or cylinder of the link", "half the least thickness of the same"),
+            };
+            let radius_m = Some(shape.radius_m());
+            return Ok(Tip { link, offset_m, radius_m, offset_from, radius_from, is_end: false });
         }
         let joint = &self.assembly.joints[self.end];
         let link = self.robot.joints[joint.joint].child;

@@ -8,11 +8,14 @@ mod text;
 use super::super::check::Result;
 use super::super::error::{Place, SceneError};
 use super::super::file::HandFile;
+use super::super::hand::posture;
 use super::super::hand_model::HandModel;
 use super::super::library::{Document, read_text};
+use super::super::one_line;
 use super::keys::Keys;
 use super::robot::{Kind, Robot};
 use super::topology::Tree;
+use blindgrasp_body::{Hand, Part, overlap_m, pairs};
 use gains::Gains;
 use std::path::PathBuf;
 
@@ -68,11 +71,17 @@ impl StarterRequest {
             .and_then(|fingertips| text::Draft::new(&robot, &tree, keys, fingertips))
             .map_err(on_command_line)?;
         // Kinematics and masses as any command will see them; gains do not matter to them.
-        let (model, file) = self.hand(&draft.write(&Gains::preliminary(&draft)))?;
+        let (model, file) = self.hand(&draft.write(&Gains::preliminary(&draft), &[]))?;
         let gains = Gains::new(&draft, &file, &model.hand)?;
-        let text = draft.write(&gains);
-        let (HandModel { warnings, .. }, _) = self.hand(&text)?;
-        Ok(Starter { text, guesses: draft.guesses(&gains), warnings })
+        let surfaces = draft.surfaces(&file);
+        let overlap = overlap(&file, &model.hand);
+        let comments: Vec<&str> = surfaces.iter().chain(&overlap).map(String::as_str).collect();
+        let text = draft.write(&gains, &comments);
+        let (HandModel { mut warnings, .. }, _) = self.hand(&text)?;
+        warnings.extend(overlap);
+        let mut guesses = draft.guesses(&gains);
+        guesses.extend(surfaces);
+        Ok(Starter { text, guesses, warnings })
     }
 
     /// The table `[urdf]`.
@@ -91,6 +100,29 @@ impl StarterRequest {
     fn hand(&self, text: &str) -> Result<(HandModel, HandFile)> {
         HandModel::from_document(Document::parse(text, "the new hand's file", &self.folder)?)
     }
+}
+
+/// Tells the capsules of a hand that are in each other's way, or in a fingertip's, at its nominal angles.
+fn overlap(file: &HandFile, hand: &Hand) -> Option<String> {
+    let nominal_rad: Vec<f64> = file.joints.iter().map(|joint| joint.nominal_rad).collect();
+    let (capsules, posture) = (file.capsules(hand), posture(hand, &nominal_rad));
+    // Fingertips may meet.
+    let has_capsule = |parts: &[Part; 2]| parts.iter().any(|part| matches!(part, Part::Capsule(_)));
+    let parts = pairs(hand, &capsules).into_iter().filter(has_capsule);
+    let depths_m = parts.map(|parts| (overlap_m(parts, hand, &posture, &capsules), parts));
+    let overlaps: Vec<_> = depths_m.filter(|(depth_m, _)| *depth_m > 0.0).collect();
+    let (depth_m, parts) = *overlaps.iter().max_by(|a, b| a.0.total_cmp(&b.0))?;
+    let [first, second] = parts.map(|part| file.part_in_words(part));
+    let others = match overlaps.len() - 1 {
+        0 => String::new(),
+        1 => " (and so does another pair)".into(),
+        count => format!(" (and so do {count} more pairs)"),
+    };
+    let depth_mm = depth_m * 1e3;
+    Some(one_line(&format!(
+        "{first} and {second} overlap by {depth_mm:.1} mm at the nominal angles{others}, and no scene can start so; give \
+         [[capsule]]s that don't, or set plant.links = false in scenes"
+    )))
 }
 
 /// Errors about keys of `[urdf]` come from options of the command.

@@ -2,7 +2,7 @@
 
 use super::super::super::check::{LONGEST_NAME, Result};
 use super::super::super::error::SceneError;
-use super::super::super::file::{SCHEMA, Safety};
+use super::super::super::file::{HandFile, SCHEMA, Safety};
 use super::super::assembly::{Assembly, MOST_NAMES, resting, toml_key};
 use super::super::complete::PLACEHOLDER;
 use super::super::keys::Keys;
@@ -174,10 +174,41 @@ impl<'a> Draft<'a> {
         guesses
     }
 
-    /// The file.
-    pub(super) fn write(&self, gains: &Gains) -> String {
+    /// Returns what became of the shapes of links that touch, a line each.
+    pub(super) fn surfaces(&self, file: &HandFile) -> Vec<String> {
+        let seated = self.robot.links.iter().zip(&self.assembly.seats).filter(|(_, seat)| seat.is_some());
+        let left_out = seated.flat_map(|(link, _)| {
+            link.left_out.iter().map(|what| format!("`{}` ({what})", quote(&link.name)))
+        });
+        let left_out: Vec<String> = left_out.collect();
+        let mut lines = Vec::new();
+        if !file.capsules.is_empty() {
+            lines.push(format!("surfaces of links: {} capsules in <collision> shapes", file.capsules.len()));
+        }
+        if !left_out.is_empty() {
+            let named = &left_out[..left_out.len().min(MOST_NAMES)];
+            let more = match left_out.len() - named.len() {
+                0 => String::new(),
+                more => format!(" and {more} more"),
+            };
+            lines.push(format!(
+                "these links touch nothing with what is no sphere, box, cylinder or capsule: {}{more}",
+                named.join(", ")
+            ));
+        }
+        lines
+    }
+
+    /// The file, with comments on its capsules.
+    pub(super) fn write(&self, gains: &Gains, comments: &[&str]) -> String {
         let mut text = String::new();
         self.write_head(&mut text, gains);
+        if !comments.is_empty() {
+            let _ = writeln!(text, "\n# Links and palm; [[capsule]]s here replace those of the URDF:");
+            comments.iter().for_each(|comment| {
+                let _ = writeln!(text, "# - {comment}.");
+            });
+        }
         for k in 0..self.needs.len() {
             self.write_joint(&mut text, gains, k);
         }

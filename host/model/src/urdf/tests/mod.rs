@@ -4,6 +4,7 @@ mod damage;
 mod expansion;
 mod hand_file;
 mod refusals;
+mod shapes;
 mod starter;
 
 use super::super::file::HandFile;

@@ -57,7 +57,8 @@ fn gains_of_the_paper_s_hand_are_those_of_table_vii() {
         assert!((1.0 / 7.0..7.0).contains(&ratio), "{}: {ratio}", ours.name);
         assert_eq!(ours.coulomb_friction_nm, theirs.coulomb_friction_nm);
     }
-    assert_eq!(starter.guesses.len(), 4);
+    assert_eq!(starter.guesses.len(), 5);
+    assert_eq!(hand.capsules, original.capsules);
 }
 
 /// Every built-in hand, written as a URDF, makes a file that can be used.
@@ -74,6 +75,10 @@ fn every_built_in_hand_can_be_started_again() {
                 other.link == tip.link && other.offset_m == tip.offset_m && other.radius_m == tip.radius_m
             };
             assert_eq!(hand.fingertips.iter().filter(is_same).count(), 1, "{name}: {}", tip.name);
+        }
+        assert_eq!(hand.capsules.len(), original.capsules.len(), "{name}");
+        for capsule in &original.capsules {
+            assert!(hand.capsules.contains(capsule), "{name}: {capsule:?}");
         }
     }
 }
@@ -172,6 +177,60 @@ fn fingertips_are_found_in_four_ways() {
     assert_eq!(radius, 0.011);
     let length = (2.0_f64 * 0.025 - radius * 0.025 / 0.00125_f64.hypot(0.025)) * 1e5;
     assert!((offset[2] * 1e5 - length).abs() < 0.51, "{offset:?} {length}");
+}
+
+/// Surfaces come from the URDF; what has none, and what is in each other's way, is told and stands in the file.
+#[test]
+fn surfaces_are_told() {
+    let palm = "<link name=\"palm\"><collision><geometry><mesh filename=\"palm.dae\"/></geometry></collision>\
+                <collision><geometry><box size=\"0.02 0.02\"/></geometry></collision>\
+                <collision><origin xyz=\"0 0 0.05\"/><geometry><sphere radius=\"0.02\"/></geometry></collision>";
+    let left = "<link name=\"left-2\"><collision><origin xyz=\"0 -0.04 0\"/><geometry><capsule radius=\"0.01\" length=\"0.02\"/></geometry></collision>";
+    let between =
+        "<link name=\"left-1\"><collision><geometry><sphere radius=\"0.001\"/></geometry></collision>";
+    let mut urdf = GRIPPER.to_owned();
+    for (link, shapes) in [("palm", palm), ("left-1", between), ("left-2", left)] {
+        urdf = changed(&urdf, &format!("<link name=\"{link}\">"), shapes);
+    }
+    let (folder, starter) = start(&urdf, |request| request.base = Some("palm".into())).unwrap();
+    let told = [
+        "surfaces of links: 3 capsules in <collision> shapes",
+        "these links touch nothing with what is no sphere, box, cylinder or capsule: `palm` (a mesh), `palm` (a <box> that can't be read)",
+    ];
+    assert_eq!(starter.guesses[starter.guesses.len() - 2..], told);
+    let [overlap] = &starter.warnings[..] else { panic!("{:?}", starter.warnings) };
+    let end = "; give [[capsule]]s that don't, or set plant.links = false in scenes";
+    assert!(
+        overlap.starts_with("the palm (capsule 1) and link `left-knuckle` (capsule 3) overlap by ")
+            && overlap.ends_with(end),
+        "{overlap}"
+    );
+    for line in told.into_iter().chain([overlap.as_str()]) {
+        assert!(starter.text.contains(&format!("\n# - {line}.\n")), "{}", starter.text);
+    }
+    std::fs::write(folder.path("hand.toml"), &starter.text).unwrap();
+    assert_eq!(HandFile::load(folder.path("hand.toml")).unwrap().capsules.len(), 3);
+}
+
+/// The fingertip of a capsule is the ball at its far end, and the rest of it stays clear of that.
+#[test]
+fn a_capsule_ends_in_the_fingertip() {
+    let capsule = "<collision><origin xyz=\"0 0 0.02\"/><geometry><capsule radius=\"0.008\" length=\"0.04\"/></geometry></collision>";
+    let urdf = GRIPPER
+        .replace("<collision><geometry><sphere radius=\"0.01\"/></geometry></collision>", "")
+        .replace("-tip", "-pad-link")
+        .replace("<link name=\"left-2\">", &format!("<link name=\"left-2\">{capsule}"));
+    let (folder, starter) = start(&urdf, |_| ()).unwrap();
+    let hand = read(&folder, &starter);
+    assert_eq!((hand.fingertips[0].offset_m, hand.fingertips[0].radius_m), ([0.0, 0.0, 0.04], 0.008));
+    let [rest] = &hand.capsules[..] else { panic!("{:?}", hand.capsules) };
+    assert_eq!((rest.link.as_deref(), rest.from_m), (Some("left-knuckle"), [0.0; 3]));
+    assert!((rest.to_m[2] - 0.032).abs() < 1e-15, "{rest:?}");
+    assert!(
+        starter.guesses[0].contains("its centre: the end of a capsule of the link"),
+        "{:?}",
+        starter.guesses
+    );
 }
 
 #[test]
