@@ -138,6 +138,7 @@ fn pictures(number: &'static str, file: &'static str, title: &str, done: &Done, 
     let report = Report {
         title: &done.scene.name,
         hand: &done.scene.hand,
+        capsules: &done.scene.file.hand.capsules(&done.scene.hand),
         joint_names: &names(done),
         object: &done.scene.object,
         samples: &done.run.samples,

@@ -173,6 +173,7 @@ impl<'a> Files<'a> {
         let report = view::Report {
             title: &scene.name,
             hand: &scene.hand,
+            capsules: &scene.file.hand.capsules(&scene.hand),
             joint_names: &joint_names,
             object: &scene.object,
             samples: &self.pictured.finish(),

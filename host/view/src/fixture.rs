@@ -214,7 +214,10 @@ pub(super) type Write = fn(&Path, &Report<'_>) -> Result<(), ReportError>;
 /// Writes a report of samples.
 pub(super) fn report_of(write: Write, samples: &[Sample], dir: &Path) -> Result<(), ReportError> {
     let (hand, names, object) = (hand(), joint_names(), prism());
-    write(dir, &Report { title: "prism", hand: &hand, joint_names: &names, object: &object, samples })
+    write(
+        dir,
+        &Report { title: "prism", hand: &hand, capsules: &[], joint_names: &names, object: &object, samples },
+    )
 }
 
 /// Checks that what can't be written is named, for one file of a report.

@@ -1,7 +1,7 @@
 //! The data of a report.
 
-use blindgrasp_body::Hand;
 use blindgrasp_body::polyhedron::Polyhedron;
+use blindgrasp_body::{Capsule, Hand};
 use blindgrasp_sim::sample::Sample;
 
 /// A run and what it was about.
@@ -11,6 +11,8 @@ pub struct Report<'a> {
     pub title: &'a str,
     /// The hand.
     pub hand: &'a Hand,
+    /// Surfaces of its links and palm; where there are none, links are rods and palms plates.
+    pub capsules: &'a [Capsule],
     /// Names of its joints, in their order.
     pub joint_names: &'a [String],
     /// The object.

@@ -85,7 +85,7 @@ impl Stage {
     pub(super) fn mesh(&self, report: &Report<'_>, sample: Option<&Sample>) -> Mesh {
         let mut mesh = Mesh::default();
         let posture = posture(report.hand, sample);
-        skeleton::add(&mut mesh, report.hand, &posture, &self.sizes, &self.palms);
+        skeleton::add(&mut mesh, report.hand, report.capsules, &posture, &self.sizes, &self.palms);
         if let Some(sample) = sample {
             self.add_object(&mut mesh, report.object, sample);
             for table in &sample.tables {

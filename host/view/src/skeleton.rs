@@ -1,9 +1,10 @@
-//! The hand as shapes: rods for the links, spheres for joints and fingertips, a plate for the palm.
+//! The hand as shapes: links and palm as their capsules, or rods for links, spheres for joints and a plate for the palm where there are
+//! none; spheres for fingertips.
 
 use super::mesh::{Mesh, ROUND, WIDE};
 use super::palette::{self, Rgb};
 use super::palm::Palm;
-use blindgrasp_body::{Hand, Posture};
+use blindgrasp_body::{Capsule, Hand, Part, Posture};
 use nalgebra::Vector3;
 
 pub(super) const LINK: Rgb = [208, 212, 218];
@@ -35,13 +36,51 @@ impl Sizes {
     }
 }
 
+/// The links that are drawn as their capsules.
+pub(super) struct Covered<'a>(pub(super) &'a [Capsule]);
+
+impl Covered<'_> {
+    /// Returns `true` for a link with capsules; `None` is the base.
+    pub(super) fn link(&self, link: Option<usize>) -> bool {
+        self.0.iter().any(|capsule| capsule.link == link)
+    }
+
+    /// Returns `true` for a joint between links of which one has capsules.
+    pub(super) fn joint(&self, hand: &Hand, joint: usize) -> bool {
+        self.link(Some(joint)) || self.link(hand.parent(joint))
+    }
+
+    /// Returns the colour of a link: a finger's own, `share` of it; grey for trunk and palm.
+    pub(super) fn colour(hand: &Hand, link: Option<usize>, share: f64) -> Rgb {
+        match link {
+            None => PALM,
+            Some(joint) => {
+                owner(hand, joint).map_or(LINK, |finger| palette::mix(palette::of(finger), LINK, share))
+            }
+        }
+    }
+}
+
 /// Adds the hand to a mesh.
-pub(super) fn add(mesh: &mut Mesh, hand: &Hand, posture: &Posture, sizes: &Sizes, palms: &[Palm]) {
-    let origin = |k: usize| posture.link(k).origin_m;
+pub(super) fn add(
+    mesh: &mut Mesh,
+    hand: &Hand,
+    capsules: &[Capsule],
+    posture: &Posture,
+    sizes: &Sizes,
+    palms: &[Palm],
+) {
+    let (origin, covered) = (|k: usize| posture.link(k).origin_m, Covered(capsules));
+    for (k, capsule) in capsules.iter().enumerate() {
+        let ends = Part::Capsule(k).ends_m(posture, capsules);
+        let colour = Covered::colour(hand, capsule.link, 0.26);
+        mesh.cone(ends, [capsule.radius_m; 2], ROUND, colour);
+        ends.iter().for_each(|end| mesh.sphere(*end, capsule.radius_m, ROUND, colour));
+    }
     for joint in 0..hand.joint_count() {
         let parent = hand.parent(joint);
         // Links that start from a plate lie in it.
-        if palms.iter().any(|palm| palm.link == parent) {
+        if covered.link(parent) || palms.iter().any(|palm| palm.link == parent) {
             continue;
         }
         let foot = parent.map_or(Vector3::zeros(), origin);
@@ -50,7 +89,7 @@ pub(super) fn add(mesh: &mut Mesh, hand: &Hand, posture: &Posture, sizes: &Sizes
         }
         link(mesh, hand, joint, [foot, origin(joint)], sizes);
     }
-    for palm in palms {
+    for palm in palms.iter().filter(|palm| !covered.link(palm.link)) {
         let (centre, normal) = palm.placed(posture);
         plate(mesh, centre, normal, palm.radius_m, sizes);
         if let Some(link) = palm.link {
@@ -58,15 +97,18 @@ pub(super) fn add(mesh: &mut Mesh, hand: &Hand, posture: &Posture, sizes: &Sizes
             mesh.cone([origin(link), inside], [sizes.trunk_radius_m; 2], ROUND, LINK);
         }
     }
-    for joint in 0..hand.joint_count() {
+    for joint in (0..hand.joint_count()).filter(|&joint| !covered.joint(hand, joint)) {
         let radius =
             if owner(hand, joint).is_some() { sizes.joint_radius_m } else { 1.2 * sizes.trunk_radius_m };
         mesh.sphere(origin(joint), radius, ROUND, JOINT);
     }
     for finger in 0..hand.fingertip_count() {
-        let (centre, radius) = (posture.centres_m[finger], hand.radius_m(finger));
-        let colour = palette::mix(palette::of(finger), LINK, 0.26);
-        mesh.cone([origin(hand.fingertip_link(finger)), centre], [sizes.link_radius_m; 2], ROUND, colour);
+        let (centre, radius, link) =
+            (posture.centres_m[finger], hand.radius_m(finger), hand.fingertip_link(finger));
+        if !covered.link(Some(link)) {
+            let colour = palette::mix(palette::of(finger), LINK, 0.26);
+            mesh.cone([origin(link), centre], [sizes.link_radius_m; 2], ROUND, colour);
+        }
         mesh.sphere(centre, radius, ROUND, palette::mix(palette::of(finger), palette::WHITE, 0.85));
     }
 }

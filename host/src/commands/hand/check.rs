@@ -36,8 +36,8 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
     terminal::print(&text).context("cannot print the findings")?;
     if let Some(path) = &arguments.picture {
         match &check.nominal {
-            Some(NominalHand { hand, joint_names, angles_rad }) => {
-                let svg = view::hand_svg(&check.name, hand, joint_names, angles_rad);
+            Some(NominalHand { hand, capsules, joint_names, angles_rad }) => {
+                let svg = view::hand_svg(&check.name, hand, capsules, joint_names, angles_rad);
                 files::write(path, svg, true)?;
                 eprintln!("blindgrasp: wrote {}", path.display());
             }

@@ -1,13 +1,13 @@
-//! A hand: rods and balls, the axes of its joints, and what is called what.
+//! A hand: its capsules, or rods and balls, the axes of its joints, and what is called what.
 
 use super::super::camera::{Camera, Extent, View};
 use super::super::palette::{self, FAINT_INK, INK, Rgb};
 use super::super::palm::Palm;
-use super::super::skeleton::{JOINT, LINK, PALM, Sizes, owner};
+use super::super::skeleton::{Covered, JOINT, LINK, PALM, Sizes, owner};
 use super::super::text::shortened;
 use super::svg::{Anchor, Svg, hex, toward};
 use super::{MARGIN, TOP, VIEW, WIDTH, flat, frame, frame_axes, scale_bar, title};
-use blindgrasp_body::{Hand, MAX_JOINTS, Posture};
+use blindgrasp_body::{Capsule, Hand, MAX_JOINTS, Part as Surface, Posture};
 use blindgrasp_shared::math::Real;
 use nalgebra::Vector3;
 
@@ -22,8 +22,19 @@ const ROW: f64 = 17.0;
 
 /// A part of the hand that is drawn in one go.
 enum Part {
-    Ball { centre: Vector3<f64>, radius_m: f64, colour: Rgb },
-    Rod { ends: [Vector3<f64>; 2], radius_m: f64, colour: Rgb, fill: String },
+    Ball {
+        centre: Vector3<f64>,
+        radius_m: f64,
+        colour: Rgb,
+    },
+    /// A piece of a rod; its ends may be round.
+    Rod {
+        ends: [Vector3<f64>; 2],
+        round: [bool; 2],
+        radius_m: f64,
+        colour: Rgb,
+        fill: String,
+    },
 }
 
 impl Part {
@@ -59,9 +70,15 @@ struct Plate {
 /// the axis of each joint as an arrow (the joint turns about it by the right hand) with its number, the base frame, a scale
 /// bar, and the names of the joints by number.
 ///
-/// `names` are those of the joints in the hand's order, `angles_rad` the posture; what lies beyond the hand's joints does not
-/// matter.
-pub fn hand_svg(name: &str, hand: &Hand, names: &[String], angles_rad: &[f64; MAX_JOINTS]) -> String {
+/// `capsules` are its surfaces; links without are rods. `names` are those of the joints in the hand's order, `angles_rad` the posture;
+/// what lies beyond the hand's joints does not matter.
+pub fn hand_svg(
+    name: &str,
+    hand: &Hand,
+    capsules: &[Capsule],
+    names: &[String],
+    angles_rad: &[f64; MAX_JOINTS],
+) -> String {
     let mut posture = Posture::at_base();
     hand.forward_kinematics(angles_rad, &mut posture);
     let mut svg = Svg::default();
@@ -72,7 +89,7 @@ pub fn hand_svg(name: &str, hand: &Hand, names: &[String], angles_rad: &[f64; MA
     );
     title(&mut svg, &shortened(name, 70), &about);
     for (index, view) in views(hand, &posture).into_iter().enumerate() {
-        draw_view(&mut svg, index, view, hand, &posture);
+        draw_view(&mut svg, index, view, hand, capsules, &posture);
     }
     let height = list(&mut svg, hand, names);
     svg.finish(WIDTH, height)
@@ -88,13 +105,13 @@ fn views(hand: &Hand, posture: &Posture) -> [View; 2] {
     [first, first.turned(90.0)]
 }
 
-fn draw_view(svg: &mut Svg, index: usize, view: View, hand: &Hand, posture: &Posture) {
-    let sizes = Sizes::of(hand);
-    let plates = plates(hand, posture, &sizes);
-    let points = points(hand, posture, &sizes, &plates);
+fn draw_view(svg: &mut Svg, index: usize, view: View, hand: &Hand, capsules: &[Capsule], posture: &Posture) {
+    let (sizes, covered) = (Sizes::of(hand), Covered(capsules));
+    let plates = plates(hand, &covered, posture, &sizes);
+    let points = points(hand, capsules, posture, &sizes, &plates);
     let (from, to) = frame(index);
     let camera = Camera::fitted(view, &Extent::around(points.iter().map(|p| view.flat(p))), from, to);
-    let parts = parts(svg, &camera, hand, posture, &sizes);
+    let parts = parts(svg, &camera, hand, &covered, posture, &sizes);
     paint(svg, &camera, &plates, parts);
     let extent = points.iter().map(|p| (p - middle(&points)).norm()).fold(0.0, f64::max);
     frame_axes(svg, &camera, &Vector3::zeros(), [0.3 * extent; 3]);
@@ -112,27 +129,37 @@ fn middle(points: &[Vector3<f64>]) -> Vector3<f64> {
 }
 
 /// Corners of all that is drawn, m.
-fn points(hand: &Hand, posture: &Posture, sizes: &Sizes, plates: &[Plate]) -> Vec<Vector3<f64>> {
+fn points(
+    hand: &Hand,
+    capsules: &[Capsule],
+    posture: &Posture,
+    sizes: &Sizes,
+    plates: &[Plate],
+) -> Vec<Vector3<f64>> {
     let mut balls: Vec<(Vector3<f64>, f64)> =
         (0..hand.joint_count()).map(|k| (posture.link(k).origin_m, sizes.joint_radius_m)).collect();
     balls.extend((0..hand.fingertip_count()).map(|i| (posture.centres_m[i], hand.radius_m(i))));
+    for (k, capsule) in capsules.iter().enumerate() {
+        balls.extend(Surface::Capsule(k).ends_m(posture, capsules).map(|end| (end, capsule.radius_m)));
+    }
     balls.push((Vector3::zeros(), 0.0));
     balls.extend(plates.iter().map(|plate| (plate.centre, plate.radius_m)));
     let sides = [Vector3::x(), -Vector3::x(), Vector3::y(), -Vector3::y(), Vector3::z(), -Vector3::z()];
     balls.iter().flat_map(|(centre, radius)| sides.iter().map(move |side| centre + side * *radius)).collect()
 }
 
-fn plates(hand: &Hand, posture: &Posture, sizes: &Sizes) -> Vec<Plate> {
+fn plates(hand: &Hand, covered: &Covered<'_>, posture: &Posture, sizes: &Sizes) -> Vec<Plate> {
     let palms = Palm::all(hand, posture);
     let mut plates: Vec<Plate> = palms
         .iter()
+        .filter(|palm| !covered.link(palm.link))
         .map(|palm| {
             let (centre, normal) = palm.placed(posture);
             let radius_m = palm.radius_m + 2.2 * sizes.link_radius_m;
             Plate { centre, normal, radius_m, thickness_m: 0.12 * radius_m + sizes.link_radius_m }
         })
         .collect();
-    if palms.iter().all(|palm| palm.link.is_some()) {
+    if palms.iter().all(|palm| palm.link.is_some()) && !covered.link(None) {
         let radius_m = 3.0 * sizes.trunk_radius_m;
         plates.push(Plate {
             centre: Vector3::zeros(),
@@ -144,54 +171,82 @@ fn plates(hand: &Hand, posture: &Posture, sizes: &Sizes) -> Vec<Plate> {
     plates
 }
 
-/// Rods in pieces, joints and fingertips.
-fn parts(svg: &mut Svg, camera: &Camera, hand: &Hand, posture: &Posture, sizes: &Sizes) -> Vec<Part> {
+/// Capsules and rods in pieces, joints and fingertips.
+fn parts(
+    svg: &mut Svg,
+    camera: &Camera,
+    hand: &Hand,
+    covered: &Covered<'_>,
+    posture: &Posture,
+    sizes: &Sizes,
+) -> Vec<Part> {
+    const SHARE: f64 = 0.4;
     let origin = |k: usize| posture.link(k).origin_m;
-    let colour = |finger: Option<usize>| finger.map_or(LINK, |i| palette::mix(palette::of(i), LINK, 0.4));
     let palms = Palm::all(hand, posture);
     let mut parts = Vec::new();
+    for (k, capsule) in covered.0.iter().enumerate() {
+        let ends = Surface::Capsule(k).ends_m(posture, covered.0);
+        let colour = Covered::colour(hand, capsule.link, SHARE);
+        rod(svg, camera, &mut parts, Shaft { ends, radius_m: capsule.radius_m, colour, is_round: true });
+    }
+    let mut flat = |parts: &mut Vec<Part>, ends, radius_m, colour| {
+        rod(svg, camera, parts, Shaft { ends, radius_m, colour, is_round: false });
+    };
     for k in 0..hand.joint_count() {
         let (parent, finger) = (hand.parent(k), owner(hand, k));
         let radius_m = if finger.is_some() { sizes.link_radius_m } else { sizes.trunk_radius_m };
         let joint_m = if finger.is_some() { sizes.joint_radius_m } else { 1.2 * sizes.trunk_radius_m };
         // Links that start from a plate lie in it.
-        if palms.iter().all(|palm| palm.link != parent) {
+        if palms.iter().all(|palm| palm.link != parent) && !covered.link(parent) {
             let from = parent.map_or(Vector3::zeros(), origin);
-            rod(svg, camera, &mut parts, [from, origin(k)], radius_m, colour(finger));
+            flat(&mut parts, [from, origin(k)], radius_m, Covered::colour(hand, Some(k), SHARE));
         }
-        parts.push(Part::Ball { centre: origin(k), radius_m: joint_m, colour: JOINT });
+        if !covered.joint(hand, k) {
+            parts.push(Part::Ball { centre: origin(k), radius_m: joint_m, colour: JOINT });
+        }
     }
-    for palm in &palms {
+    for palm in palms.iter().filter(|palm| !covered.link(palm.link)) {
         if let Some(link) = palm.link {
-            let ends = [origin(link), palm.placed(posture).0];
-            rod(svg, camera, &mut parts, ends, sizes.trunk_radius_m, LINK);
+            flat(&mut parts, [origin(link), palm.placed(posture).0], sizes.trunk_radius_m, LINK);
         }
     }
     for i in 0..hand.fingertip_count() {
-        let ends = [origin(hand.fingertip_link(i)), posture.centres_m[i]];
-        rod(svg, camera, &mut parts, ends, sizes.link_radius_m, colour(Some(i)));
+        let (link, centre) = (hand.fingertip_link(i), posture.centres_m[i]);
+        if !covered.link(Some(link)) {
+            let colour = palette::mix(palette::of(i), LINK, SHARE);
+            flat(&mut parts, [origin(link), centre], sizes.link_radius_m, colour);
+        }
         let colour = palette::mix(palette::of(i), palette::WHITE, 0.8);
-        parts.push(Part::Ball { centre: ends[1], radius_m: hand.radius_m(i), colour });
+        parts.push(Part::Ball { centre, radius_m: hand.radius_m(i), colour });
     }
     parts
 }
 
-fn rod(
-    svg: &mut Svg,
-    camera: &Camera,
-    parts: &mut Vec<Part>,
+/// A rod, or a capsule.
+struct Shaft {
     ends: [Vector3<f64>; 2],
     radius_m: f64,
     colour: Rgb,
-) {
+    is_round: bool,
+}
+
+fn rod(svg: &mut Svg, camera: &Camera, parts: &mut Vec<Part>, shaft: Shaft) {
+    let Shaft { ends, radius_m, colour, is_round } = shaft;
     let length = (ends[1] - ends[0]).norm();
     let (from, to) = (flat(camera, &ends[0]), flat(camera, &ends[1]));
-    let Some(side) = across(from, to, radius_m * camera.pixels_per_m) else { return };
+    let Some(side) = across(from, to, radius_m * camera.pixels_per_m) else {
+        if is_round {
+            let nearer = usize::from(camera.view.back.dot(&(ends[1] - ends[0])) > 0.0);
+            parts.push(Part::Ball { centre: ends[nearer], radius_m, colour });
+        }
+        return;
+    };
     let fill = svg.rod_fill(from, side, colour);
     let pieces = (length / radius_m.max(1e-3 * length)).ceil().clamp(1.0, PIECES) as usize;
     let at = |k: usize| ends[0] + (ends[1] - ends[0]) * (k as f64 / pieces as f64);
     parts.extend((0..pieces).map(|k| Part::Rod {
         ends: [at(k), at(k + 1)],
+        round: [is_round && k == 0, is_round && k + 1 == pieces],
         radius_m,
         colour,
         fill: fill.clone(),
@@ -234,19 +289,38 @@ fn draw(svg: &mut Svg, camera: &Camera, part: &Part) {
                 toward(*colour, 0.0, 0.5),
             );
         }
-        Part::Rod { ends, radius_m, colour, fill } => {
+        Part::Rod { ends, round, radius_m, colour, fill } => {
             let (from, to) = (flat(camera, &ends[0]), flat(camera, &ends[1]));
             let Some([x, y]) = across(from, to, radius_m * camera.pixels_per_m) else { return };
             // A little over, so that no gap shows between two pieces.
             let over = |a: f64, b: f64| 0.04 * (b - a);
             let [dx, dy] = [over(from[0], to[0]), over(from[1], to[1])];
             let (a, b) = ([from[0] - dx, from[1] - dy], [to[0] + dx, to[1] + dy]);
-            let corners =
-                vec![[a[0] + x, a[1] + y], [b[0] + x, b[1] + y], [b[0] - x, b[1] - y], [a[0] - x, a[1] - y]];
-            svg.fill(&corners, fill);
+            // Half a turn about an end, from its side (x, y) over what is beyond it.
+            let half = |at: [f64; 2], [x, y]: [f64; 2]| {
+                (0..=12).map(move |k| {
+                    let (sine, cosine) = (f64::from(k) * std::f64::consts::PI / 12.0).sine_cosine();
+                    [at[0] + x * cosine + y * sine, at[1] + y * cosine - x * sine]
+                })
+            };
+            let end = |is_round: bool, round_at, flat_at: [f64; 2], [x, y]: [f64; 2]| -> Vec<[f64; 2]> {
+                if is_round {
+                    half(round_at, [x, y]).collect()
+                } else {
+                    vec![[flat_at[0] + x, flat_at[1] + y], [flat_at[0] - x, flat_at[1] - y]]
+                }
+            };
+            let (last, first) = (end(round[1], to, b, [x, y]), end(round[0], from, a, [-x, -y]));
+            svg.fill(&[last.as_slice(), first.as_slice()].concat(), fill);
+            let edge = toward(*colour, 0.0, 0.5);
             for sign in [1.0, -1.0] {
                 let side = |p: [f64; 2]| [p[0] + sign * x, p[1] + sign * y];
-                svg.line(&[side(from), side(to)], 0.8, toward(*colour, 0.0, 0.5));
+                svg.line(&[side(from), side(to)], 0.8, edge);
+            }
+            for (is_round, outline) in [(round[0], first), (round[1], last)] {
+                if is_round {
+                    svg.line(&outline, 0.8, edge);
+                }
             }
         }
     }

@@ -16,7 +16,7 @@ mod text;
 
 use super::finding::{Counts, Findings, Severity, Verdict};
 use crate::{Examined, HandFile, HandModel, Places, SceneError, still_joints};
-use blindgrasp_body::{Hand, MAX_JOINTS};
+use blindgrasp_body::{Capsule, Hand, MAX_JOINTS};
 use found::Found;
 use serde::Serialize;
 use specimen::Specimen;
@@ -59,6 +59,8 @@ pub struct HandCheck {
 pub struct NominalHand {
     /// The hand.
     pub hand: Hand,
+    /// Its surfaces, as far as their numbers can be used.
+    pub capsules: Vec<Capsule>,
     /// Names of its joints, in its order.
     pub joint_names: Vec<String>,
     /// Nominal angles within the limits, rad; zero beyond the hand's joints.
@@ -113,6 +115,7 @@ impl HandCheck {
             findings,
             nominal: specimen.map(|specimen| NominalHand {
                 hand: specimen.hand.clone(),
+                capsules: specimen.capsules(),
                 joint_names: specimen.file.joints.iter().map(|joint| joint.name.clone()).collect(),
                 angles_rad: specimen.nominal_rad,
             }),

@@ -1,9 +1,10 @@
 //! The hand under inspection, as the rules see it.
 
+use crate::hand::is_capsule;
 use crate::inspect::finding::{Finding, Severity};
 use crate::{HandFile, posture};
 use blindgrasp_body::inverse_kinematics::is_trunk;
-use blindgrasp_body::{Hand, MAX_JOINTS, Posture};
+use blindgrasp_body::{Capsule, Hand, MAX_JOINTS, Posture};
 use nalgebra::Vector3;
 
 /// The hand under inspection.
@@ -37,6 +38,13 @@ impl Specimen {
         let own = (0..hand.fingertip_count()).map(own).collect();
         let posture = posture(&hand, &nominal_rad);
         Self { file, numbers, hand, nominal_rad, posture, own }
+    }
+
+    /// Its surfaces, as far as their numbers can be used.
+    pub(super) fn capsules(&self) -> Vec<Capsule> {
+        let mut capsules = self.file.capsules(&self.hand);
+        capsules.retain(|capsule| is_capsule(&capsule.ends_m, capsule.radius_m));
+        capsules
     }
 
     pub(super) fn fingers(&self) -> usize {
