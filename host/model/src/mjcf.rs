@@ -7,13 +7,15 @@
 #[cfg(test)]
 mod tests;
 
+use super::Scene;
 use super::check::{Result, fail, item};
 use super::file::{ContactLaw, JointFile, ShapeFile};
 use super::hand::{posture, rotation};
 use super::urdf::export::{Lines, Names, bones, escaped, inertia, numbers};
-use super::{HandFile, Scene};
 use blindgrasp_body::dynamics::{Body, JointMatrix, mass_matrix, place_bodies};
-use blindgrasp_body::{ContactFriction, FingertipModel, Hand, MAX_JOINTS, equilibrium_indentations};
+use blindgrasp_body::{
+    ContactFriction, FingertipModel, Hand, MAX_JOINTS, Part, equilibrium_indentations, pairs,
+};
 use blindgrasp_shared::math::Real;
 use nalgebra::{DMatrix, DVector, UnitQuaternion, Vector3};
 use std::f64::consts::PI;
@@ -115,6 +117,11 @@ fn core_name(tip: &str) -> String {
     format!("{tip}-core")
 }
 
+/// Name of a capsule of the hand.
+fn capsule_name(capsule: usize) -> String {
+    format!("capsule-{}", capsule + 1)
+}
+
 fn table_name(table: usize) -> String {
     format!("table-{}", table + 1)
 }
@@ -133,9 +140,7 @@ impl Export<'_> {
         let scene = self.scene;
         self.head();
         self.line(1, "<worldbody>");
-        for (end, radius_m) in bones(self.hand(), None) {
-            self.bone(2, &end, radius_m);
-        }
+        self.surface(2, None);
         let order = self.bodies(2, None);
         self.object();
         self.tables();
@@ -163,10 +168,6 @@ impl Export<'_> {
         self.lines.text()
     }
 
-    fn hand(&self) -> &HandFile {
-        &self.scene.file.hand
-    }
-
     fn line(&mut self, depth: usize, text: impl AsRef<str>) {
         self.lines.line(depth, text);
     }
@@ -179,7 +180,7 @@ impl Export<'_> {
             "     Fingertips press as they do in blindgrasp (k dr^2, Eq. 14), in force and in slope, where the grasp settles (Eq. 57),",
             "     within 8 % from a seventh of that depth to one and a half of it. The geometry that touches is a core, with a margin as",
             "     deep as the fingertip settles. solref and solimp of a core hold for these masses: MuJoCo makes stiffness of them with",
-            "     the inertia that it estimates at joint angles zero. What touches is what has a pair. -->",
+            "     the inertia that it estimates at joint angles zero. What touches is what has a pair; links and palm are hard. -->",
         ] {
             self.line(0, line);
         }
@@ -206,13 +207,29 @@ impl Export<'_> {
         }
     }
 
-    fn bone(&mut self, depth: usize, end: &Vector3<f64>, radius_m: f64) {
-        let ends = numbers(&[0.0, 0.0, 0.0, end.x, end.y, end.z]);
-        let rgba = "0.75 0.75 0.78 1";
-        self.line(
-            depth,
-            format!("<geom type=\"capsule\" fromto=\"{ends}\" size=\"{radius_m:?}\" rgba=\"{rgba}\"/>"),
-        );
+    /// The capsules of a link, or its bones in a hand without capsules.
+    fn surface(&mut self, depth: usize, link: Option<&str>) {
+        let hand = &self.scene.file.hand;
+        if hand.capsules.is_empty() {
+            for (end, radius_m) in bones(hand, link) {
+                self.capsule(depth, "", [&[0.0; 3], &end.into()], radius_m);
+            }
+        }
+        for (k, capsule) in hand.capsules.iter().enumerate() {
+            if capsule.link.as_deref() == link {
+                let name = format!("name=\"{}\" ", capsule_name(k));
+                self.capsule(depth, &name, [&capsule.from_m, &capsule.to_m], capsule.radius_m);
+            }
+        }
+    }
+
+    fn capsule(&mut self, depth: usize, name: &str, [from_m, to_m]: [&[f64; 3]; 2], radius_m: f64) {
+        let place = if from_m == to_m {
+            format!("type=\"sphere\" pos=\"{}\"", numbers(to_m))
+        } else {
+            format!("type=\"capsule\" fromto=\"{} {}\"", numbers(from_m), numbers(to_m))
+        };
+        self.line(depth, format!("<geom {name}{place} size=\"{radius_m:?}\" rgba=\"0.75 0.75 0.78 1\"/>"));
     }
 
     /// The links on a joint's link, or on the base; returns the joints in the order of the file.
@@ -256,9 +273,7 @@ impl Export<'_> {
         );
         let (mass_kg, moments) = inertia(joint);
         self.inertial(depth + 1, mass_kg, &joint.mass_centre_m, &moments);
-        for (end, radius_m) in bones(&scene.file.hand, Some(&joint.name)) {
-            self.bone(depth + 1, &end, radius_m);
-        }
+        self.surface(depth + 1, Some(&joint.name));
         for (i, tip) in scene.file.hand.fingertips.iter().enumerate() {
             if tip.link != joint.name {
                 continue;
@@ -342,11 +357,55 @@ impl Export<'_> {
                 self.pair(&name, &table_name(t), &friction, &soft);
             }
         }
+        let hard = format!("solref=\"{HARD}\"");
+        let sliding = |sliding: f64| ContactFriction { sliding, torsion_m: 0.0 };
         for (t, table) in scene.plant.tables.iter().enumerate() {
-            let friction = ContactFriction { sliding: table.friction, torsion_m: 0.0 };
-            self.pair(OBJECT, &table_name(t), &friction, &format!("solref=\"{HARD}\""));
+            self.pair(OBJECT, &table_name(t), &sliding(table.friction), &hard);
+        }
+        for (k, capsule) in scene.capsules.iter().enumerate() {
+            self.pair(&capsule_name(k), OBJECT, &sliding(scene.capsule_friction[k]), &hard);
+            // What does not move never comes to a table with any force.
+            for (t, table) in scene.plant.tables.iter().enumerate().filter(|_| capsule.link.is_some()) {
+                self.pair(&capsule_name(k), &table_name(t), &sliding(table.friction), &hard);
+            }
+        }
+        if scene.plant.links_touch() {
+            for parts in pairs(&scene.hand, &scene.capsules) {
+                self.parts(parts, &hard);
+            }
         }
         self.line(1, "</contact>");
+    }
+
+    /// Two parts of the hand: as soft as the fingertips among them.
+    fn parts(&mut self, parts: [Part; 2], hard: &str) {
+        let scene = self.scene;
+        let [(first, first_friction), (second, second_friction)] = parts.map(|part| match part {
+            Part::Capsule(k) => (capsule_name(k), scene.capsule_friction[k]),
+            Part::Fingertip(i) => {
+                (core_name(&escaped(&self.names.tips[i])), scene.fingertip_friction[i].sliding)
+            }
+        });
+        let friction = ContactFriction { sliding: first_friction.min(second_friction), torsion_m: 0.0 };
+        let links = parts.into_iter().filter_map(|part| part.link(&scene.hand, &scene.capsules));
+        let yield_per_kg = links.map(|link| yields_per_kg(&scene.hand, &scene.rotors_kg_m2(), link)).sum();
+        let soft: Vec<usize> = parts
+            .iter()
+            .filter_map(|part| match part {
+                Part::Fingertip(i) => Some(*i),
+                Part::Capsule(_) => None,
+            })
+            .collect();
+        let soft = match soft[..] {
+            [i] => softness(&scene.fingertips[i], self.settled_m[i], yield_per_kg, self.step_s),
+            [i, j] => {
+                let depth_m = self.settled_m[i] + self.settled_m[j];
+                let tip = between(&scene.fingertips[i], &scene.fingertips[j]);
+                softness(&tip, depth_m, yield_per_kg, self.step_s)
+            }
+            _ => hard.to_owned(),
+        };
+        self.pair(&first, &second, &friction, &soft);
     }
 
     fn pair(&mut self, first: &str, second: &str, friction: &ContactFriction, soft: &str) {
@@ -370,6 +429,17 @@ impl Export<'_> {
 
 fn wxyz(turn: &UnitQuaternion<f64>) -> [f64; 4] {
     [turn.w, turn.i, turn.j, turn.k]
+}
+
+/// The fingertip that gives way as two that are pressed onto each other, each by its own law, with the same force.
+fn between(first: &FingertipModel, second: &FingertipModel) -> FingertipModel {
+    let sum: f64 = [first, second].map(|tip| 1.0 / tip.stiffness_n_m2.square_root()).iter().sum();
+    FingertipModel {
+        radius_m: first.radius_m.min(second.radius_m),
+        stiffness_n_m2: 1.0 / (sum * sum),
+        damping_n_s_m3: 1.0 / (1.0 / first.damping_n_s_m3 + 1.0 / second.damping_n_s_m3),
+        torsion_n_s_m: 0.0,
+    }
 }
 
 /// Depths at which the fingertips settle, m.

@@ -2,6 +2,7 @@
 
 use crate::Scene;
 use crate::tests::load;
+use blindgrasp_body::pairs as parts_pairs;
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 use roxmltree::{Document, Node};
 use std::f64::consts::PI;
@@ -88,7 +89,24 @@ fn assert_whole(scene: &Scene) {
     assert_eq!(numbers(inertial(object), "fullinertia"), moments);
     let pairs = document.descendants().filter(|node| node.has_tag_name("pair")).count();
     let (fingers, tables) = (scene.fingertips.len(), scene.plant.tables.len());
-    assert_eq!(pairs, fingers * (1 + tables) + tables);
+    let moving = scene.capsules.iter().filter(|capsule| capsule.link.is_some()).count();
+    let on_capsules = scene.capsules.len() + moving * tables;
+    let in_hand = if scene.plant.links_touch() { parts_pairs(&scene.hand, &scene.capsules).len() } else { 0 };
+    assert_eq!(pairs, fingers * (1 + tables) + tables + on_capsules + in_hand);
+    for (k, capsule) in scene.file.hand.capsules.iter().enumerate() {
+        let geom = named(&document, "geom", &format!("capsule-{}", k + 1));
+        let body = capsule.link.as_ref().map(|link| format!("{link}-link"));
+        assert_eq!(geom.parent().unwrap().attribute("name"), body.as_deref());
+        assert_eq!(number(geom, "size"), capsule.radius_m);
+        if capsule.from_m == capsule.to_m {
+            assert_eq!(
+                (geom.attribute("type"), numbers(geom, "pos")),
+                (Some("sphere"), capsule.to_m.to_vec())
+            );
+        } else {
+            assert_eq!(numbers(geom, "fromto"), [capsule.from_m, capsule.to_m].concat());
+        }
+    }
     for (t, table) in scene.plant.tables.iter().enumerate() {
         let body = named(&document, "body", &format!("table-{}", t + 1));
         assert_eq!((body.attribute("mocap"), numbers(body, "pos")), (Some("true"), table.point_m.to_vec()));
@@ -112,6 +130,50 @@ fn everything_is_in_it_to_the_bit() {
     assert_whole(&load("cube-table", &[]).unwrap());
     let other_normal = ["plant.table.1.normal=[0.0, 0.6, 0.8]", "plant.table.1.point_m=[0.0, 0.0, -1.0]"];
     assert_whole(&load("cube-table", &other_normal).unwrap());
+}
+
+/// Three capsules of the three-fingered hand: palm, a link, and a ball on another.
+const CAPSULES: &str = "hand.capsule=[{ from_m = [-0.02, 0.0, -0.01], to_m = [0.02, 0.0, -0.01], radius_m = 0.01 }, \
+    { link = \"finger-1-flex-2\", from_m = [0.0, 0.0, 0.0], to_m = [0.0, 0.0, 0.02], radius_m = 0.006, friction = 0.2 }, \
+    { link = \"finger-2-flex-3\", from_m = [0.001, 0.0, 0.0], to_m = [0.001, 0.0, 0.0], radius_m = 0.005 }]";
+
+/// The pairs of links and palm: hard and with friction of their own; with a fingertip as soft as that.
+#[test]
+fn links_touch_what_they_touch_in_ours() {
+    let scene = load("cube-table", &[CAPSULES]).unwrap();
+    assert_whole(&scene);
+    let text = scene.to_mjcf().unwrap().text;
+    let document = Document::parse(&text).unwrap();
+    let pair = |first: &str, second: &str| {
+        document.descendants().find(|node| {
+            let are = |a, b| node.attribute("geom1") == Some(a) && node.attribute("geom2") == Some(b);
+            are(first, second) || are(second, first)
+        })
+    };
+    let friction = |first: &str, second: &str| {
+        let pair = pair(first, second).unwrap_or_else(|| panic!("{first} and {second}"));
+        assert_eq!(pair.attribute("condim"), Some("3"));
+        (numbers(pair, "friction")[0], pair.attribute("solref").unwrap())
+    };
+    let sliding = scene.fingertip_friction[0].sliding;
+    assert!(sliding > 0.2 && scene.capsule_friction == [sliding, 0.2, sliding]);
+    assert_eq!(friction("capsule-1", "object"), (sliding, super::HARD));
+    assert_eq!(friction("capsule-2", "object"), (0.2, super::HARD));
+    assert_eq!(friction("capsule-2", "table-1"), (scene.plant.tables[0].friction, super::HARD));
+    assert_eq!(friction("capsule-2", "capsule-3"), (0.2, super::HARD));
+    let [tip, other] = ["finger-2-tip-core", "finger-3-tip-core"];
+    let (of_tip, soft) = friction("capsule-2", tip);
+    assert!(of_tip == 0.2 && soft != super::HARD && number(pair("capsule-2", tip).unwrap(), "margin") > 0.0);
+    // Two fingertips give way twice as far.
+    let margin = |first: &str, second: &str| number(pair(first, second).unwrap(), "margin");
+    assert!((margin(tip, other) - margin(tip, "object") - margin(other, "object")).abs() < 1e-15);
+    // The palm does not move, and links that are joined never touch.
+    assert!(pair("capsule-1", "table-1").is_none());
+    assert!(pair("capsule-1", "capsule-2").is_none() && pair("capsule-3", tip).is_none());
+    let silent = load("cube-table", &[CAPSULES, "plant.links=false"]).unwrap();
+    assert_whole(&silent);
+    let text = silent.to_mjcf().unwrap().text;
+    assert!(text.contains("name=\"capsule-3\"") && !text.contains("geom1=\"capsule"));
 }
 
 /// MuJoCo's law with the numbers of the file is ours where the grasp settles, in force and in slope.
