@@ -42,6 +42,11 @@ impl Soup {
         }
     }
 
+    /// The triangles.
+    pub fn triangles(&self) -> &[[Vector3<f64>; 3]] {
+        &self.triangles
+    }
+
     /// Returns the extents along x, y and z.
     pub fn size(&self) -> Vector3<f64> {
         let Some(start) = self.triangles.first().map(|corners| corners[0]) else { return Vector3::zeros() };

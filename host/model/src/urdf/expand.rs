@@ -73,6 +73,43 @@ pub(crate) fn expand(hand: &mut Node, home: &Home, notices: &mut Vec<Finding>) -
     hand_parts.add_joints(hand, notices)
 }
 
+/// A capsule, and what it is on.
+pub(super) struct Surface {
+    /// The link of the URDF.
+    pub(super) link: usize,
+    /// Index of the joint that carries it; none on the base.
+    pub(super) joint: Option<usize>,
+    /// In the frame of that joint's own link.
+    pub(super) round: Round,
+    /// `true` for what more shapes have.
+    pub(super) is_more: bool,
+}
+
+/// The capsules of the shapes that touch, and of more shapes of links, beside fingertips: carrying joint, centre in the frame of its
+/// link (m) and radius (m) of each.
+pub(super) fn surfaces(
+    robot: &Robot,
+    assembly: &Assembly,
+    fingertips: &[(usize, Vector3<f64>, f64)],
+    more: &[(usize, Shape)],
+) -> Vec<Surface> {
+    let mut surfaces = Vec::new();
+    for (k, (link, seat)) in robot.links.iter().zip(&assembly.seats).enumerate() {
+        let Some(Seat { joint, frame }) = *seat else { continue };
+        let placed = |shape: &Shape| frame.map_or(*shape, |frame| shape.seen_from(&frame));
+        let own = link.shapes.iter().filter(|shape| shape.is_collision).map(placed).collect();
+        let others = more.iter().filter(|(link, _)| *link == k).map(|(_, shape)| placed(shape)).collect();
+        let on_it = fingertips.iter().filter(|(carrier, ..)| Some(*carrier) == joint);
+        let on_it: Vec<_> = on_it.map(|(_, centre_m, radius_m)| (*centre_m, *radius_m)).collect();
+        for (shapes, is_more) in [(own, false), (others, true)] {
+            let shapes: Vec<Shape> = shapes;
+            let rounds = capsules(&shapes, &on_it).into_iter();
+            surfaces.extend(rounds.map(|round| Surface { link: k, joint, round, is_more }));
+        }
+    }
+    surfaces
+}
+
 /// The parts of the entries.
 pub(super) struct Parts<'a> {
     pub(super) robot: &'a Robot,
@@ -164,32 +201,25 @@ impl Parts<'_> {
         fingertips: &[FingertipFile],
         centres_m: &[(usize, Vector3<f64>)],
     ) -> Option<Finding> {
-        let mut items = Vec::new();
-        let mut beyond = 0;
-        for (link, seat) in self.robot.links.iter().zip(&self.assembly.seats) {
-            let Some(Seat { joint, frame }) = *seat else { continue };
-            let shapes: Vec<Shape> = link
-                .shapes
-                .iter()
-                .filter(|shape| shape.is_collision)
-                .map(|shape| frame.map_or(*shape, |frame| shape.seen_from(&frame)))
-                .collect();
-            let on_it = fingertips.iter().zip(centres_m).filter(|(_, (carrier, _))| Some(*carrier) == joint);
-            let on_it: Vec<_> = on_it.map(|(tip, (_, centre_m))| (*centre_m, tip.radius_m)).collect();
-            for Round { ends_m: [from_m, to_m], radius_m } in capsules(&shapes, &on_it) {
-                if !is_capsule(&[from_m, to_m], radius_m) {
-                    beyond += 1;
-                    continue;
-                }
-                let mut node = Node { value: Value::Table(Vec::new()), place: link.place.clone() };
-                if let Some(joint) = joint {
-                    node.insert("link", text(self.name(joint), &link.place));
-                }
-                node.insert("from_m", list(&from_m.into(), &link.place));
-                node.insert("to_m", list(&to_m.into(), &link.place));
-                node.insert("radius_m", number(radius_m, &link.place));
-                items.push(node);
+        let (mut items, mut beyond) = (Vec::new(), 0);
+        let tips = centres_m.iter().zip(fingertips);
+        let tips: Vec<_> = tips.map(|((joint, centre_m), tip)| (*joint, *centre_m, tip.radius_m)).collect();
+        for Surface { link, joint, round: Round { ends_m: [from_m, to_m], radius_m }, .. } in
+            surfaces(self.robot, self.assembly, &tips, &[])
+        {
+            if !is_capsule(&[from_m, to_m], radius_m) {
+                beyond += 1;
+                continue;
             }
+            let place = &self.robot.links[link].place;
+            let mut node = Node { value: Value::Table(Vec::new()), place: place.clone() };
+            if let Some(joint) = joint {
+                node.insert("link", text(self.name(joint), place));
+            }
+            node.insert("from_m", list(&from_m.into(), place));
+            node.insert("to_m", list(&to_m.into(), place));
+            node.insert("radius_m", number(radius_m, place));
+            items.push(node);
         }
         let told = |what: String| {
             Some(Finding::notice(&self.robot.place, what, "give the hand's file [[capsule]]s of its own"))

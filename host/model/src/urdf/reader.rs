@@ -2,7 +2,7 @@
 
 use super::super::error::{Place, SceneError, suggestion};
 use super::body::Body;
-use super::robot::{Dynamics, Joint, Kind, Limit, Link, Origin, Robot};
+use super::robot::{Dynamics, Joint, Kind, Limit, Link, Mesh, Origin, Robot};
 use super::shape::{Shape, Solid};
 use super::transform::Transform;
 use super::xml::{Text, child, children, quote};
@@ -144,8 +144,8 @@ impl Reader<'_> {
             Some(inertial) => (self.body(&of, inertial), self.text.place(inertial)),
             None => (Ok(Body::none()), place.clone()),
         };
-        let (shapes, left_out) = self.shapes(element);
-        Ok(Link { name, place, body, body_place, shapes, left_out })
+        let (shapes, meshes, left_out) = self.shapes(element);
+        Ok(Link { name, place, body, body_place, shapes, meshes, left_out })
     }
 
     fn body(&self, of: &str, inertial: Node<'_, '_>) -> Result<Body, SceneError> {
@@ -190,25 +190,34 @@ impl Reader<'_> {
         Ok(body.seen_from(&origin.transform))
     }
 
-    /// Returns the shapes of a link, and says of each `<collision>` that is none of them what it is.
-    fn shapes(&self, link: Node<'_, '_>) -> (Vec<Shape>, Vec<String>) {
-        let (mut shapes, mut left_out) = (Vec::new(), Vec::new());
+    /// Returns the shapes of a link, and the meshes that it touches with; and says of each other `<collision>` what it is.
+    fn shapes(&self, link: Node<'_, '_>) -> (Vec<Shape>, Vec<Mesh>, Vec<String>) {
+        let (mut shapes, mut meshes, mut left_out) = (Vec::new(), Vec::new(), Vec::new());
         for (tag, is_collision) in [("collision", true), ("visual", false)] {
             for element in children(link, tag) {
                 let solid = child(element, "geometry").and_then(|geometry| geometry.first_element_child());
                 let shape = solid.and_then(|solid| self.shape(element, solid, is_collision));
                 match shape {
                     Some(shape) => shapes.push(shape),
-                    None if is_collision => left_out.push(match solid.map(|solid| solid.tag_name().name()) {
-                        None => "a <collision> without a shape".into(),
-                        Some("mesh") => "a mesh".into(),
-                        Some(tag) => format!("a <{}> that can't be read", quote(tag)),
-                    }),
-                    None => {}
+                    None if !is_collision => {}
+                    None => match solid.and_then(|solid| self.mesh(element, solid)) {
+                        Some(mesh) => meshes.push(mesh),
+                        None => {
+                            left_out.push(solid.map_or("a <collision> without a shape".into(), |solid| {
+                                format!("a <{}> that can't be read", quote(solid.tag_name().name()))
+                            }))
+                        }
+                    },
                 }
             }
         }
-        (shapes, left_out)
+        (shapes, meshes, left_out)
+    }
+
+    fn mesh(&self, element: Node<'_, '_>, solid: Node<'_, '_>) -> Option<Mesh> {
+        let file = solid.attribute("filename").filter(|_| solid.tag_name().name() == "mesh")?.into();
+        let scale = self.text.numbers("", solid, "scale").ok()?.unwrap_or([1.0; 3]);
+        Some(Mesh { file, scale, pose: self.origin("", element).ok()?.transform })
     }
 
     /// A shape whose numbers can be read.

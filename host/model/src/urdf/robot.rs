@@ -26,8 +26,21 @@ pub(super) struct Link {
     pub(super) body_place: Place,
     /// Its shapes, as far as no mesh is needed to know them: those that touch, then those that are only seen.
     pub(super) shapes: Vec<Shape>,
+    /// Meshes that touch.
+    pub(super) meshes: Vec<Mesh>,
     /// The other shapes that touch, in words.
     pub(super) left_out: Vec<String>,
+}
+
+/// A mesh of a link.
+#[derive(Clone, Debug)]
+pub(super) struct Mesh {
+    /// Its file, as the URDF names it.
+    pub(super) file: String,
+    /// Factors on its coordinates, which are m with them.
+    pub(super) scale: [f64; 3],
+    /// Its frame in the link's.
+    pub(super) pose: Transform,
 }
 
 /// A joint.

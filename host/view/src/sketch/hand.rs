@@ -27,9 +27,10 @@ enum Part {
         radius_m: f64,
         colour: Rgb,
     },
-    /// A piece of a rod; its ends may be round.
+    /// A piece of a rod, or of a capsule, whose first and last ends are round.
     Rod {
         ends: [Vector3<f64>; 2],
+        is_capsule: bool,
         round: [bool; 2],
         radius_m: f64,
         colour: Rgb,
@@ -45,11 +46,11 @@ impl Part {
         }
     }
 
-    /// Returns its place in the order from far to near, m: a ball counts from near its front, so that it covers the
-    /// rods that end in it.
+    /// Returns its place in the order from far to near, m: balls and capsules count from near their front, so that a ball covers
+    /// the rods that end in it, and a thick capsule a thin one inside it.
     fn nearness(&self, camera: &Camera) -> f64 {
         let bulge = match self {
-            Self::Ball { radius_m, .. } => 0.8 * radius_m,
+            Self::Ball { radius_m, .. } | Self::Rod { is_capsule: true, radius_m, .. } => 0.8 * radius_m,
             Self::Rod { .. } => 0.0,
         };
         camera.view.back.dot(&self.middle()) + bulge
@@ -246,6 +247,7 @@ fn rod(svg: &mut Svg, camera: &Camera, parts: &mut Vec<Part>, shaft: Shaft) {
     let at = |k: usize| ends[0] + (ends[1] - ends[0]) * (k as f64 / pieces as f64);
     parts.extend((0..pieces).map(|k| Part::Rod {
         ends: [at(k), at(k + 1)],
+        is_capsule: is_round,
         round: [is_round && k == 0, is_round && k + 1 == pieces],
         radius_m,
         colour,
@@ -289,7 +291,7 @@ fn draw(svg: &mut Svg, camera: &Camera, part: &Part) {
                 toward(*colour, 0.0, 0.5),
             );
         }
-        Part::Rod { ends, round, radius_m, colour, fill } => {
+        Part::Rod { ends, round, radius_m, colour, fill, .. } => {
             let (from, to) = (flat(camera, &ends[0]), flat(camera, &ends[1]));
             let Some([x, y]) = across(from, to, radius_m * camera.pixels_per_m) else { return };
             // A little over, so that no gap shows between two pieces.

@@ -3,6 +3,8 @@
 
 mod fingertips;
 mod gains;
+mod meshes;
+mod surfaces;
 mod text;
 
 use super::super::check::Result;
@@ -17,7 +19,8 @@ use super::robot::{Kind, Robot};
 use super::topology::Tree;
 use blindgrasp_body::{Hand, Part, overlap_m, pairs};
 use gains::Gains;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
+use surfaces::Surfaces;
 
 /// The request for a hand's file.
 #[derive(Clone, Debug, Default)]
@@ -71,16 +74,19 @@ impl StarterRequest {
             .and_then(|fingertips| text::Draft::new(&robot, &tree, keys, fingertips))
             .map_err(on_command_line)?;
         // Kinematics and masses as any command will see them; gains do not matter to them.
-        let (model, file) = self.hand(&draft.write(&Gains::preliminary(&draft), &[]))?;
+        let (model, file) = self.hand(&draft.write(&Gains::preliminary(&draft), &Surfaces::default()))?;
         let gains = Gains::new(&draft, &file, &model.hand)?;
-        let surfaces = draft.surfaces(&file);
-        let overlap = overlap(&file, &model.hand);
-        let comments: Vec<&str> = surfaces.iter().chain(&overlap).map(String::as_str).collect();
-        let text = draft.write(&gains, &comments);
-        let (HandModel { mut warnings, .. }, _) = self.hand(&text)?;
-        warnings.extend(overlap);
+        let mut surfaces = Surfaces::of(&draft, path.parent().unwrap_or(Path::new("")));
+        let (HandModel { hand, mut warnings, .. }, file) = self.hand(&draft.write(&gains, &surfaces))?;
         let mut guesses = draft.guesses(&gains);
-        guesses.extend(surfaces);
+        surfaces.tell(&file);
+        guesses.extend(surfaces.comments.iter().cloned());
+        if let Some(overlap) = overlap(&file, &hand) {
+            surfaces.comments.push(overlap.clone());
+            warnings.push(overlap);
+        }
+        let text = draft.write(&gains, &surfaces);
+        self.hand(&text)?;
         Ok(Starter { text, guesses, warnings })
     }
 

@@ -2,7 +2,7 @@
 
 use super::super::super::check::{LONGEST_NAME, Result};
 use super::super::super::error::SceneError;
-use super::super::super::file::{HandFile, SCHEMA, Safety};
+use super::super::super::file::{SCHEMA, Safety};
 use super::super::assembly::{Assembly, MOST_NAMES, resting, toml_key};
 use super::super::complete::PLACEHOLDER;
 use super::super::keys::Keys;
@@ -11,6 +11,8 @@ use super::super::topology::Tree;
 use super::super::xml::quote;
 use super::fingertips::{ASKED, Tip, radius_of};
 use super::gains::{self, Gains};
+use super::surfaces::Surfaces;
+use nalgebra::Vector3;
 use std::f64::consts::{FRAC_PI_2, PI};
 use std::fmt::Write as _;
 
@@ -110,6 +112,16 @@ impl<'a> Draft<'a> {
         &self.robot.joints[self.assembly.joints[index].joint]
     }
 
+    /// The joint that carries each fingertip, its centre in the frame of the joint's link (m), and its radius (m).
+    pub(super) fn seated_tips(&self) -> Vec<(usize, Vector3<f64>, f64)> {
+        let seated = |(i, tip): (usize, &Tip)| {
+            let frame = self.assembly.seats[tip.link].and_then(|seat| seat.frame);
+            let centre_m = frame.map_or(tip.offset_m, |frame| frame.point(&tip.offset_m));
+            (self.carrier(i), centre_m, self.radii_m[i])
+        };
+        self.tips.iter().enumerate().map(seated).collect()
+    }
+
     /// Index of the joint that carries a fingertip.
     pub(super) fn carrier(&self, tip: usize) -> usize {
         self.assembly.seats[self.tips[tip].link].and_then(|seat| seat.joint).unwrap_or(0)
@@ -174,47 +186,17 @@ impl<'a> Draft<'a> {
         guesses
     }
 
-    /// Returns what became of the shapes of links that touch, a line each.
-    pub(super) fn surfaces(&self, file: &HandFile) -> Vec<String> {
-        let seated = self.robot.links.iter().zip(&self.assembly.seats).filter(|(_, seat)| seat.is_some());
-        let left_out = seated.flat_map(|(link, _)| {
-            link.left_out.iter().map(|what| format!("`{}` ({what})", quote(&link.name)))
-        });
-        let left_out: Vec<String> = left_out.collect();
-        let mut lines = Vec::new();
-        if !file.capsules.is_empty() {
-            lines.push(format!("surfaces of links: {} capsules in <collision> shapes", file.capsules.len()));
-        }
-        if !left_out.is_empty() {
-            let named = &left_out[..left_out.len().min(MOST_NAMES)];
-            let more = match left_out.len() - named.len() {
-                0 => String::new(),
-                more => format!(" and {more} more"),
-            };
-            lines.push(format!(
-                "these links touch nothing with what is no sphere, box, cylinder or capsule: {}{more}",
-                named.join(", ")
-            ));
-        }
-        lines
-    }
-
-    /// The file, with comments on its capsules.
-    pub(super) fn write(&self, gains: &Gains, comments: &[&str]) -> String {
+    /// The file.
+    pub(super) fn write(&self, gains: &Gains, surfaces: &Surfaces) -> String {
         let mut text = String::new();
         self.write_head(&mut text, gains);
-        if !comments.is_empty() {
-            let _ = writeln!(text, "\n# Links and palm; [[capsule]]s here replace those of the URDF:");
-            comments.iter().for_each(|comment| {
-                let _ = writeln!(text, "# - {comment}.");
-            });
-        }
         for k in 0..self.needs.len() {
             self.write_joint(&mut text, gains, k);
         }
         for i in 0..self.tips.len() {
             self.write_fingertip(&mut text, gains, i);
         }
+        surfaces.write(self.robot, &self.assembly, &mut text);
         write_safety(&mut text);
         text
     }

@@ -3,6 +3,7 @@
 use super::super::starter::{FingertipRequest, Starter, StarterRequest};
 use super::*;
 use crate::HandModel;
+use blindgrasp_shared::math::Real;
 
 /// Starts from a URDF; errors are without the folder.
 fn start(urdf: &str, change: impl Fn(&mut StarterRequest)) -> Result<(Folder, Starter), String> {
@@ -195,7 +196,7 @@ fn surfaces_are_told() {
     let (folder, starter) = start(&urdf, |request| request.base = Some("palm".into())).unwrap();
     let told = [
         "surfaces of links: 3 capsules in <collision> shapes",
-        "these links touch nothing with what is no sphere, box, cylinder or capsule: `palm` (a mesh), `palm` (a <box> that can't be read)",
+        "no surface, so that nothing touches it there: `palm` (a <box> that can't be read), `palm` (a mesh: it is neither STL nor OBJ)",
     ];
     assert_eq!(starter.guesses[starter.guesses.len() - 2..], told);
     let [overlap] = &starter.warnings[..] else { panic!("{:?}", starter.warnings) };
@@ -210,6 +211,87 @@ fn surfaces_are_told() {
     }
     std::fs::write(folder.path("hand.toml"), &starter.text).unwrap();
     assert_eq!(HandFile::load(folder.path("hand.toml")).unwrap().capsules.len(), 3);
+}
+
+/// A box as an OBJ file, mm.
+fn box_of_mm(sides: [f64; 3]) -> String {
+    let mut text = String::new();
+    for k in 0..8 {
+        let corner = |axis: usize| if k >> axis & 1 == 1 { sides[axis] / 2.0 } else { -sides[axis] / 2.0 };
+        text += &format!("v {:?} {:?} {:?}\n", corner(0), corner(1), corner(2));
+    }
+    text + "f 1 3 4 2\nf 5 6 8 7\nf 1 2 6 5\nf 3 7 8 4\nf 1 5 7 3\nf 2 4 8 6\n"
+}
+
+/// Capsules in the boxes around meshes are written down as guesses, with those of the URDF, which they replace.
+#[test]
+fn surfaces_of_meshes_are_guessed() {
+    let mesh = |file: &str, origin: &str| {
+        format!(
+            "<collision>{origin}<geometry><mesh filename=\"{file}\" scale=\"0.001 0.001 0.001\"/></geometry></collision>"
+        )
+    };
+    let palm = mesh("package://gripper/meshes/palm.obj", "<origin xyz=\"0.01 0 -0.03\" rpy=\"0 0 0.5\"/>");
+    let ball = "<collision><origin xyz=\"0.1 0 0.001\"/><geometry><sphere radius=\"0.0123456789\"/></geometry></collision>";
+    // Around the fingertip, whose link is turned.
+    let (tip, missing) =
+        (mesh("tip.obj", "<origin xyz=\"0 0 -0.03\"/>"), mesh("package://other/palm.obj", ""));
+    let mut urdf = GRIPPER.to_owned();
+    for (link, shapes) in [("palm", &format!("{palm}{ball}")), ("left-tip", &tip), ("right-2", &missing)] {
+        let link = format!("<link name=\"{link}\">");
+        urdf = changed(&urdf, &link, &format!("{link}{shapes}"));
+    }
+    let above = tempfile::tempdir().unwrap();
+    let (package, meshes) = (above.path().join("gripper/urdf"), above.path().join("gripper/meshes"));
+    for folder in [&package, &meshes] {
+        std::fs::create_dir_all(folder).unwrap();
+    }
+    std::fs::write(package.join("gripper.urdf"), urdf).unwrap();
+    std::fs::write(meshes.join("palm.obj"), box_of_mm([60.0, 20.0, 40.0])).unwrap();
+    std::fs::write(package.join("tip.obj"), box_of_mm([8.0, 8.0, 60.0])).unwrap();
+    let request = StarterRequest {
+        file: "gripper.urdf".into(),
+        folder: package.clone(),
+        base: Some("palm".into()),
+        ..StarterRequest::default()
+    };
+    let starter = request.start().unwrap();
+    assert_eq!(
+        starter.guesses[starter.guesses.len() - 3..],
+        [
+            "surfaces of links: 1 capsule in <collision> shapes",
+            "surfaces of links: 3 capsules in the smallest boxes around meshes",
+            "no surface, so that nothing touches it there: `right-2` (a mesh: its file is not found)",
+        ]
+    );
+    std::fs::write(package.join("hand.toml"), &starter.text).unwrap();
+    let hand = HandFile::load(package.join("hand.toml")).unwrap();
+    let links: Vec<Option<&str>> = hand.capsules.iter().map(|capsule| capsule.link.as_deref()).collect();
+    assert_eq!(links, [None, None, None, Some("left-knuckle")]);
+    // The URDF's own to the bit; guesses to a hundredth of a millimetre.
+    let ball = &hand.capsules[0];
+    assert_eq!((ball.from_m, ball.to_m, ball.radius_m), ([0.1, 0.0, 0.001], [0.1, 0.0, 0.001], 0.0123456789));
+    let (sine, cosine) = 0.5_f64.sine_cosine();
+    let near = |found: [f64; 3], expected: [f64; 3]| {
+        found.iter().zip(expected).all(|(found, expected)| (found - expected).abs() < 0.51e-5)
+    };
+    let mut ends: Vec<[f64; 3]> = hand.capsules[1..3].iter().flat_map(|it| [it.from_m, it.to_m]).collect();
+    ends.sort_by(|a, b| (a[2], a[0]).partial_cmp(&(b[2], b[0])).unwrap());
+    let expected = [(-0.02, -0.04), (0.02, -0.04), (-0.02, -0.02), (0.02, -0.02)];
+    for (found, (x, z)) in ends.into_iter().zip(expected) {
+        assert!(near(found, [0.01 + x * cosine, x * sine, z]), "{found:?}");
+    }
+    // From 56 mm before the fingertip's centre, 4 mm inside the box, to where its round end leaves the fingertip's 10 mm free.
+    let (sine, cosine) = 0.3_f64.sine_cosine();
+    let finger = &hand.capsules[3];
+    let at = |before: f64| [-before * sine, 0.005, 0.04 - before * cosine];
+    let (far, free) =
+        if near(finger.to_m, at(0.01)) { (finger.from_m, finger.to_m) } else { (finger.to_m, finger.from_m) };
+    assert!(near(far, at(0.056)) && near(free, at(0.01)) && finger.radius_m == 0.004, "{finger:?}");
+    assert_eq!(
+        starter.text.matches("radius_m = 0.01  # GUESS: in the smallest box around a mesh").count(),
+        2
+    );
 }
 
 /// The fingertip of a capsule is the ball at its far end, and the rest of it stays clear of that.
