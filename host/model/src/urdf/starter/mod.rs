@@ -79,12 +79,11 @@ impl StarterRequest {
         let mut surfaces = Surfaces::of(&draft, path.parent().unwrap_or(Path::new("")));
         let (HandModel { hand, mut warnings, .. }, file) = self.hand(&draft.write(&gains, &surfaces))?;
         let mut guesses = draft.guesses(&gains);
-        surfaces.tell(&file);
-        guesses.extend(surfaces.comments.iter().cloned());
-        if let Some(overlap) = overlap(&file, &hand) {
-            surfaces.comments.push(overlap.clone());
-            warnings.push(overlap);
-        }
+        guesses.extend(surfaces.guess());
+        let odd: Vec<String> = surfaces.gap().into_iter().chain(overlap(&file, &hand)).collect();
+        let known = surfaces.of_the_urdf(&file).into_iter().chain(surfaces.guess());
+        surfaces.comments = known.chain(odd.iter().cloned()).collect();
+        warnings.extend(odd);
         let text = draft.write(&gains, &surfaces);
         self.hand(&text)?;
         Ok(Starter { text, guesses, warnings })

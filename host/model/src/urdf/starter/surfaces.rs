@@ -44,27 +44,29 @@ impl Surfaces {
         Self { left_out: left_out.collect(), written, comments: Vec::new() }
     }
 
-    /// Says what the capsules of the file are.
-    pub(super) fn tell(&mut self, file: &HandFile) {
-        let guessed = self.written.iter().filter(|surface| surface.is_more).count();
-        for (count, from) in [
-            (file.capsules.len() - guessed, "in <collision> shapes"),
-            (guessed, "in the smallest boxes around meshes"),
-        ] {
-            if count > 0 {
-                let capsules = if count == 1 { "capsule" } else { "capsules" };
-                self.comments.push(format!("surfaces of links: {count} {capsules} {from}"));
-            }
-        }
-        if !self.left_out.is_empty() {
-            let named = &self.left_out[..self.left_out.len().min(MOST_NAMES)];
-            let more = match self.left_out.len() - named.len() {
-                0 => String::new(),
-                more => format!(" and {more} more"),
-            };
-            let comment = format!("no surface, so that nothing touches it there: {}{more}", named.join(", "));
-            self.comments.push(comment);
-        }
+    fn guessed(&self) -> usize {
+        self.written.iter().filter(|surface| surface.is_more).count()
+    }
+
+    /// Tells the capsules of a file that are the URDF's.
+    pub(super) fn of_the_urdf(&self, file: &HandFile) -> Option<String> {
+        told(file.capsules.len() - self.guessed(), "in <collision> shapes")
+    }
+
+    /// Tells the capsules that are guessed.
+    pub(super) fn guess(&self) -> Option<String> {
+        told(self.guessed(), "in the smallest boxes around meshes")
+    }
+
+    /// Tells the shapes that touch nothing.
+    pub(super) fn gap(&self) -> Option<String> {
+        let named =
+            self.left_out.get(..self.left_out.len().min(MOST_NAMES)).filter(|named| !named.is_empty())?;
+        let more = match self.left_out.len() - named.len() {
+            0 => String::new(),
+            more => format!(" and {more} more"),
+        };
+        Some(one_line(&format!("no surface, so that nothing touches it there: {}{more}", named.join(", "))))
     }
 
     /// Adds them to the file's text.
@@ -77,7 +79,7 @@ impl Surfaces {
             };
             let _ = writeln!(text, "\n# Links and palm: {rule}.");
             self.comments.iter().for_each(|comment| {
-                let _ = writeln!(text, "# - {}.", one_line(comment));
+                let _ = writeln!(text, "# - {comment}.");
             });
         }
         for Surface { joint, round, is_more, .. } in &self.written {
@@ -94,5 +96,13 @@ impl Surfaces {
             }
             let _ = writeln!(text, "radius_m = {:?}{guess}", rounded(round.radius_m).max(1e-4));
         }
+    }
+}
+
+fn told(count: usize, place: &str) -> Option<String> {
+    match count {
+        0 => None,
+        1 => Some(format!("surfaces of links: 1 capsule {place}")),
+        _ => Some(format!("surfaces of links: {count} capsules {place}")),
     }
 }
