@@ -13,6 +13,7 @@ use super::file::{ContactLaw, JointFile, ShapeFile};
 use super::hand::{posture, rotation};
 use super::urdf::export::{Lines, Names, bones, escaped, inertia, numbers};
 use blindgrasp_body::dynamics::{Body, JointMatrix, mass_matrix, place_bodies};
+use blindgrasp_body::polyhedron::Touchable;
 use blindgrasp_body::{
     ContactFriction, FingertipModel, Hand, MAX_JOINTS, Part, equilibrium_indentations, pairs,
 };
@@ -59,13 +60,20 @@ impl Scene {
     /// The scene in MuJoCo's format: what stands in it of the world, and nothing of the controller.
     ///
     /// # Errors
-    /// A scene whose fingertips can't slip.
+    /// A scene whose fingertips can't slip, or whose object is not convex.
     pub fn to_mjcf(&self) -> Result<Mjcf> {
         if self.plant.contact == ContactLaw::Rolling {
             return fail(
                 "plant.contact",
                 "is \"rolling\": fingertips that never slip can't be said in MJCF",
                 "set it to \"coulomb\"",
+            );
+        }
+        if !Touchable::of(&self.object).is_convex() {
+            return fail(
+                "object.shape",
+                format!("`{}` is not convex: MuJoCo would take its convex hull", self.object_name),
+                "export a scene with a convex object, such as its hull",
             );
         }
         let settled_m = settled_m(self);

@@ -253,3 +253,12 @@ fn fingertips_that_never_slip_are_refused() {
         "plant.contact: is \"rolling\": fingertips that never slip can't be said in MJCF; set it to \"coulomb\""
     );
 }
+
+#[test]
+fn objects_that_are_not_convex_are_refused() {
+    let scene = load("l-bracket", &["plant.contact=coulomb", "plant.links=false"]).unwrap();
+    assert_eq!(
+        scene.to_mjcf().unwrap_err().to_string(),
+        "object.shape: `l-bracket` is not convex: MuJoCo would take its convex hull; export a scene with a convex object, such as its hull"
+    );
+}
