@@ -17,10 +17,13 @@ use super::super::one_line;
 use super::keys::Keys;
 use super::robot::{Kind, Robot};
 use super::topology::Tree;
-use blindgrasp_body::{Hand, Part, overlap_m, pairs};
+use blindgrasp_body::{Hand, overlap_m, pairs};
 use gains::Gains;
 use std::path::{Path, PathBuf};
 use surfaces::Surfaces;
+
+/// Random postures in which surfaces are looked at.
+const POSTURES: usize = 200;
 
 /// The request for a hand's file.
 #[derive(Clone, Debug, Default)]
@@ -107,25 +110,25 @@ impl StarterRequest {
     }
 }
 
-/// Tells the capsules of a hand that are in each other's way, or in a fingertip's, at its nominal angles.
+/// Tells the capsules that are inside each other, or a fingertip, in whatever posture; `hand check` tells those of the nominal one.
 fn overlap(file: &HandFile, hand: &Hand) -> Option<String> {
-    let nominal_rad: Vec<f64> = file.joints.iter().map(|joint| joint.nominal_rad).collect();
-    let (capsules, posture) = (file.capsules(hand), posture(hand, &nominal_rad));
-    // Fingertips may meet.
-    let has_capsule = |parts: &[Part; 2]| parts.iter().any(|part| matches!(part, Part::Capsule(_)));
-    let parts = pairs(hand, &capsules).into_iter().filter(has_capsule);
-    let depths_m = parts.map(|parts| (overlap_m(parts, hand, &posture, &capsules), parts));
-    let overlaps: Vec<_> = depths_m.filter(|(depth_m, _)| *depth_m > 0.0).collect();
-    let (depth_m, parts) = *overlaps.iter().max_by(|a, b| a.0.total_cmp(&b.0))?;
-    let [first, second] = parts.map(|part| file.part_in_words(part));
+    let capsules = file.capsules(hand);
+    let mut random = fastrand::Rng::with_seed(1);
+    let mut overlaps = pairs(hand, &capsules);
+    for _ in 0..POSTURES {
+        let angle = |(lower, upper): (f64, f64)| lower + (upper - lower) * random.f64();
+        let angles_rad: Vec<f64> = (0..hand.joint_count()).map(|k| hand.range_rad(k)).map(angle).collect();
+        let posture = posture(hand, &angles_rad);
+        overlaps.retain(|parts| overlap_m(*parts, hand, &posture, &capsules) > 0.0);
+    }
+    let [first, second] = overlaps.first()?.map(|part| file.part_in_words(part));
     let others = match overlaps.len() - 1 {
         0 => String::new(),
         1 => " (and so does another pair)".into(),
         count => format!(" (and so do {count} more pairs)"),
     };
-    let depth_mm = depth_m * 1e3;
     Some(one_line(&format!(
-        "{first} and {second} overlap by {depth_mm:.1} mm at the nominal angles{others}, and no scene can start so; give \
+        "{first} and {second} overlap in {POSTURES} of {POSTURES} random postures{others}, and no scene can start so; give \
          [[capsule]]s that don't, or set plant.links = false in scenes"
     )))
 }
