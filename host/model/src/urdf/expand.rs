@@ -201,36 +201,22 @@ impl Parts<'_> {
         fingertips: &[FingertipFile],
         centres_m: &[(usize, Vector3<f64>)],
     ) -> Option<Finding> {
-        let (mut items, mut beyond) = (Vec::new(), 0);
         let tips = centres_m.iter().zip(fingertips);
         let tips: Vec<_> = tips.map(|((joint, centre_m), tip)| (*joint, *centre_m, tip.radius_m)).collect();
-        for Surface { link, joint, round: Round { ends_m: [from_m, to_m], radius_m }, .. } in
-            surfaces(self.robot, self.assembly, &tips, &[])
-        {
-            if !is_capsule(&[from_m, to_m], radius_m) {
-                beyond += 1;
-                continue;
-            }
-            let place = &self.robot.links[link].place;
-            let mut node = Node { value: Value::Table(Vec::new()), place: place.clone() };
-            if let Some(joint) = joint {
-                node.insert("link", text(self.name(joint), place));
-            }
-            node.insert("from_m", list(&from_m.into(), place));
-            node.insert("to_m", list(&to_m.into(), place));
-            node.insert("radius_m", number(radius_m, place));
-            items.push(node);
-        }
+        let mut surfaces = surfaces(self.robot, self.assembly, &tips, &[]);
+        let all = surfaces.len();
+        surfaces.retain(|surface| is_capsule(&surface.round.ends_m, surface.round.radius_m));
+        let (count, beyond) = (surfaces.len(), all - surfaces.len());
         let told = |what: String| {
             Some(Finding::notice(&self.robot.place, what, "give the hand's file [[capsule]]s of its own"))
         };
-        let count = items.len();
         if count > MAX_CAPSULES {
             return told(format!(
                 "its <collision> shapes make {count} capsules, of which a hand may have {MAX_CAPSULES}: links touch nothing"
             ));
         }
         if count > 0 {
+            let items = surfaces.iter().map(|surface| self.capsule(surface)).collect();
             hand.insert("capsule", Node { value: Value::Array(items), place: self.place.clone() });
         }
         match beyond {
@@ -242,6 +228,20 @@ impl Parts<'_> {
                 "{beyond} capsules of its <collision> shapes are too small or too large: they touch nothing"
             )),
         }
+    }
+
+    /// An entry of the array `capsule`.
+    fn capsule(&self, surface: &Surface) -> Node {
+        let Surface { link, joint, round: Round { ends_m: [from_m, to_m], radius_m }, .. } = *surface;
+        let place = &self.robot.links[link].place;
+        let mut node = Node { value: Value::Table(Vec::new()), place: place.clone() };
+        if let Some(joint) = joint {
+            node.insert("link", text(self.name(joint), place));
+        }
+        node.insert("from_m", list(&from_m.into(), place));
+        node.insert("to_m", list(&to_m.into(), place));
+        node.insert("radius_m", number(radius_m, place));
+        node
     }
 
     /// The array `joint`: in its own order if it is there, else in the tree's.

@@ -216,6 +216,12 @@ fn what_a_hand_can_t_have_is_told() {
             "gripper.urdf:3: its <collision> shapes make 65 capsules, of which a hand may have 64: links touch nothing; give the hand's file [[capsule]]s of its own"
         ]
     );
+    // As many flat boxes as there may be elements: bounded time and room.
+    let flat = "<collision><geometry><box size=\"1 8 8\"/></geometry></collision>".repeat(60_000);
+    let (file, _, warnings) =
+        load(HAND, &changed(GRIPPER, "<link name=\"palm\">", &format!("<link name=\"palm\">{flat}")))
+            .unwrap();
+    assert!(file.capsules.is_empty() && warnings[0].contains("make 480000 capsules"), "{warnings:?}");
     let (file, _, warnings) = load(HAND, &balls(2, 1e-5)).unwrap();
     assert_eq!(file.capsules, []);
     assert_eq!(
