@@ -60,8 +60,9 @@ impl Posed<'_> {
         let (object, to_object) = (Touchable::of(shape), start.attitude.inverse());
         let depth_m = |number: usize| {
             let ends_m = Part::Capsule(number).ends_m(self.posture, self.capsules);
-            let [nearest, _] = object.supports(&ends_m.map(|end_m| to_object * (end_m - start.position_m)));
-            self.capsules[number].radius_m - nearest.closest.distance_m
+            let (_, nearest) =
+                object.closest_to_line(&ends_m.map(|end_m| to_object * (end_m - start.position_m)));
+            self.capsules[number].radius_m - nearest.distance_m
         };
         let depths = (0..self.capsules.len()).map(|number| (depth_m(number), number));
         match depths.max_by(|a, b| a.0.total_cmp(&b.0)) {

@@ -127,8 +127,8 @@ fn outside(taker: &Taker<'_>, posture: &Posture, stance: &Stance) -> Result<(), 
         if nearest_m > taker.object_radius_m + radius_m + CLEAR_M {
             return Ok(());
         }
-        let [nearest, _] = taker.object.supports(&ends_m);
-        let depth = radius_m - nearest.closest.distance_m;
+        let (_, nearest) = taker.object.closest_to_line(&ends_m);
+        let depth = radius_m - nearest.distance_m;
         if depth > -CLEAR_M { Err(Miss::Inside(part, depth)) } else { Ok(()) }
     })
 }
