@@ -46,7 +46,7 @@ fn what_is_grasped_on_a_table_is_held_without_it() {
             summary.last.slipped_m
         );
         assert_eq!((summary.outcome, summary.fault.as_ref()), (Outcome::Held, None), "{name}");
-        assert!(summary.settled && last.on_tables.is_empty(), "{name}");
+        assert!(summary.settled && last.others.is_empty(), "{name}");
         assert!(off < 1e-3 && creep_m_s < 1e-9, "{name}");
     }
 }

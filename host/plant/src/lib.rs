@@ -22,4 +22,4 @@ mod vectors;
 
 pub use ledger::Flows;
 pub use model::{ContactForce, Lost, ModelError, Motion, ObjectModel, PlantModel};
-pub use plant::{FingerContact, FrictionState, Plant, TableContact};
+pub use plant::{FingerContact, FrictionState, OtherContact, Plant};

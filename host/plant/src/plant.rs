@@ -49,12 +49,12 @@ pub struct FrictionState {
 
 /// A contact that is not between a fingertip and the object, at one instant.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct TableContact {
+pub struct OtherContact {
     /// The bodies.
     pub pair: Pair,
     /// Its place, m.
     pub point_m: Vector3<f64>,
-    /// Force of the table on the object or the fingertip, N.
+    /// Force of the table on the object or the hand, of a link on the object, of one part of the hand on the other, N.
     pub force_n: Vector3<f64>,
     /// Share of the limit of friction that is used: 1 where it slips.
     pub used: f64,
@@ -182,11 +182,12 @@ impl Plant {
         }
     }
 
-    /// Contacts with tables at this instant, after [`Self::solve`]: those that carry something.
-    pub fn on_tables(&self) -> Vec<TableContact> {
+    /// Contacts at this instant, after [`Self::solve`], that are not between a fingertip and the object: with tables, of links, and of
+    /// parts of the hand with each other; those that carry something.
+    pub fn others(&self) -> Vec<OtherContact> {
         match self {
             Self::Rolling(_) => Vec::new(),
-            Self::Coulomb(plant) => plant.contacts().iter().filter_map(coulomb::Contact::on_table).collect(),
+            Self::Coulomb(plant) => plant.contacts().iter().filter_map(coulomb::Contact::other).collect(),
         }
     }
 }

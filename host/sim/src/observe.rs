@@ -85,7 +85,7 @@ impl Observer {
             velocity_m_s: motion.velocity_m_s,
             spin_rad_s: motion.spin_rad_s,
             contacts: self.contacts(plant, seen.force_share),
-            on_tables: plant.on_tables(),
+            others: plant.others(),
             tables: plant.tables(),
             energy_j: energies.of_equation_40_j(),
             energies,

@@ -8,7 +8,7 @@ use super::controller::Alone;
 use super::sample::{ContactSample, Sample};
 use blindgrasp_body::{MAX_FINGERS, MAX_JOINTS};
 use blindgrasp_model::{HandFile, Scene};
-use blindgrasp_plant::TableContact;
+use blindgrasp_plant::OtherContact;
 use blindgrasp_record::mcap::{About, Contact, Device, RecordingError, Saved, Setting, Stamp, World, Writer};
 use blindgrasp_shared::identity::{Clock, Identity, Image};
 use blindgrasp_shared::link::message::Reply;
@@ -93,14 +93,14 @@ impl Recorder {
             friction_used: of.friction.map(|friction| friction.used),
             slipped_m: of.friction.map(|friction| friction.slipped_m),
         };
-        let on_table = |of: &TableContact| Contact {
+        let other = |of: &OtherContact| Contact {
             point_m: of.point_m.into(),
             force_n: of.force_n.into(),
             friction_used: Some(of.used),
             slipped_m: None,
         };
         let contacts: Vec<_> = sample.contacts.iter().map(contact).collect();
-        let on_tables: Vec<_> = sample.on_tables.iter().map(on_table).collect();
+        let others: Vec<_> = sample.others.iter().map(other).collect();
         let world = World {
             position_m: sample.position_m.into(),
             attitude: sample.attitude.coords.into(),
@@ -108,7 +108,7 @@ impl Recorder {
             speeds_rad_s: &sample.speeds_rad_s,
             torques_nm: &sample.torques_nm,
             contacts: &contacts,
-            on_tables: &on_tables,
+            others: &others,
         };
         self.writer.world(self.device, at, &world)
     }

@@ -2,7 +2,7 @@
 
 use blindgrasp_body::{Hand, MAX_JOINTS, Posture};
 use blindgrasp_plant::coulomb::Pair;
-use blindgrasp_plant::{FrictionState, TableContact};
+use blindgrasp_plant::{FrictionState, OtherContact};
 use blindgrasp_shared::control::PerGain;
 use nalgebra::{UnitQuaternion, Vector3};
 
@@ -31,8 +31,8 @@ pub struct Sample {
     pub spin_rad_s: Vector3<f64>,
     /// One for each finger.
     pub contacts: Vec<ContactSample>,
-    /// Contacts of the object and of fingertips with tables, those that carry something.
-    pub on_tables: Vec<TableContact>,
+    /// All other contacts that carry something: with tables, of links, of parts of the hand with each other.
+    pub others: Vec<OtherContact>,
     /// The tables: a point of each, m, and its normal.
     pub tables: Vec<[Vector3<f64>; 2]>,
     /// Energy of Eq. 40 with its constants added, J.
@@ -55,7 +55,13 @@ impl Sample {
 
     /// The force of tables on the object, N.
     pub fn table_force_n(&self) -> Vector3<f64> {
-        let on_object = self.on_tables.iter().filter(|of| matches!(of.pair, Pair::ObjectTable { .. }));
+        let on_object = self.others.iter().filter(|of| matches!(of.pair, Pair::ObjectTable { .. }));
+        on_object.map(|of| of.force_n).sum()
+    }
+
+    /// The force of links and palm on the object, N.
+    pub fn link_force_n(&self) -> Vector3<f64> {
+        let on_object = self.others.iter().filter(|of| matches!(of.pair, Pair::CapsuleObject { .. }));
         on_object.map(|of| of.force_n).sum()
     }
 

@@ -86,6 +86,9 @@ pub struct Last {
     /// Force of tables on the object, N.
     #[serde(default)]
     pub table_force_n: f64,
+    /// Force of links and palm on the object, N.
+    #[serde(default)]
+    pub link_force_n: f64,
 }
 
 /// Energy of Eq. 40 (with Eq. 18 in place of Eq. 46, and the constant that makes every term positive) over a run.
@@ -191,6 +194,7 @@ impl Last {
             indentation_m: each(|c| c.indentation_m),
             slipped_m: sample.contacts.iter().filter_map(|c| c.friction.map(|of| of.slipped_m)).collect(),
             table_force_n: sample.table_force_n().norm(),
+            link_force_n: sample.link_force_n().norm(),
         }
     }
 }

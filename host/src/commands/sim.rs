@@ -257,6 +257,9 @@ pub(super) fn describe(summary: &Summary) -> String {
     if !last.slipped_m.is_empty() {
         line("slipped, mm", row(&last.slipped_m, 1e3));
         line("table carries", format!("{:9.4} N", last.table_force_n));
+        if last.link_force_n > 0.0 {
+            line("links carry", format!("{:9.4} N", last.link_force_n));
+        }
     }
     text
 }

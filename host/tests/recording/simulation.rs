@@ -171,7 +171,7 @@ struct Contacts {
     #[prost(message, repeated, tag = "2")]
     contacts: Vec<Contact>,
     #[prost(message, repeated, tag = "3")]
-    tables: Vec<Contact>,
+    others: Vec<Contact>,
 }
 
 /// The messages of a topic, which all stand at the times of the ticks that were told to grasp.
@@ -220,7 +220,7 @@ fn the_true_state_of_the_world_is_recorded_to_the_bit() {
             assert_eq!(joint.acceleration, None);
         }
         assert_eq!(contacts[k].contacts.len(), sample.contacts.len());
-        assert!(contacts[k].tables.is_empty());
+        assert!(contacts[k].others.is_empty());
         for (told, contact) in contacts[k].contacts.iter().zip(&sample.contacts) {
             assert_eq!(told.point_m.bits(), bits(contact.point_m.into()));
             assert_eq!(told.force_n.bits(), bits(contact.force_on_object_n().into()));
@@ -244,22 +244,22 @@ fn friction_and_tables_are_recorded_to_the_bit() {
         truth(&std::fs::read(&path).unwrap(), "/truth/contacts", "blindgrasp.Contacts");
     assert_eq!(contacts.len(), samples.len());
     let bits = |v: [f64; 3]| [v[0], v[1], v[2], 0.0].map(f64::to_bits);
-    let mut on_tables = 0;
+    let mut others = 0;
     for (told, sample) in contacts.iter().zip(&samples) {
         for (told, contact) in told.contacts.iter().zip(&sample.contacts) {
             let friction = contact.friction.unwrap();
             assert_eq!(told.friction_used.map(f64::to_bits), Some(friction.used.to_bits()));
             assert_eq!(told.slipped_m.map(f64::to_bits), Some(friction.slipped_m.to_bits()));
         }
-        assert_eq!(told.tables.len(), sample.on_tables.len());
-        for (told, on_table) in told.tables.iter().zip(&sample.on_tables) {
+        assert_eq!(told.others.len(), sample.others.len());
+        for (told, on_table) in told.others.iter().zip(&sample.others) {
             assert_eq!(told.point_m.bits(), bits(on_table.point_m.into()));
             assert_eq!(told.force_n.bits(), bits(on_table.force_n.into()));
             assert_eq!((told.friction_used, told.slipped_m), (Some(on_table.used), None));
-            on_tables += 1;
+            others += 1;
         }
     }
-    assert!(on_tables > 20, "{on_tables}: the cube lies on the table at first");
+    assert!(others > 20, "{others}: the cube lies on the table at first");
 }
 
 #[test]

@@ -143,7 +143,7 @@ fn sample(t_s: f64) -> Sample {
         velocity_m_s: Vector3::new(0.002 * lift_speed, 0.001 * turn_speed, 0.003 * lift_speed),
         spin_rad_s: Vector3::new(0.05, 0.03, 0.1) * turn_speed,
         contacts: contacts.collect(),
-        on_tables: Vec::new(),
+        others: Vec::new(),
         tables: Vec::new(),
         energy_j: 0.1,
         energies: EnergySample::default(),

@@ -96,7 +96,7 @@ impl Stage {
                 let colour = if slips { SLIPPING } else { FORCE };
                 self.add_force(&mut mesh, contact.point_m, contact.force_on_object_n(), colour);
             }
-            for contact in &sample.on_tables {
+            for contact in &sample.others {
                 let colour = if contact.used >= 1.0 { SLIPPING } else { FORCE };
                 self.add_force(&mut mesh, contact.point_m, contact.force_n, colour);
             }

@@ -7,7 +7,7 @@ use crate::coulomb::touch::{Pair, Touch};
 use crate::friction::FrictionTorque;
 use crate::ledger::Flows;
 use crate::model::ContactForce;
-use crate::plant::{FingerContact, FrictionState, TableContact};
+use crate::plant::{FingerContact, FrictionState, OtherContact};
 use crate::vectors::{dot6, head, tail};
 use blindgrasp_body::dynamics::JointVector;
 use nalgebra::{Matrix3, Vector3};
@@ -59,12 +59,17 @@ impl Contact {
         normal * self.normal_n + x * self.tangential_n[0] + z * self.tangential_n[1]
     }
 
-    /// The contact as one with a table, if it is one and carries something.
-    pub(crate) fn on_table(&self) -> Option<TableContact> {
-        self.touch.pair.table().filter(|_| self.normal_n > 0.0)?;
-        // The table is the second body.
+    /// The contact, if it is not between a fingertip and the object and carries something.
+    pub(crate) fn other(&self) -> Option<OtherContact> {
         let (pair, point_m) = (self.touch.pair, self.touch.point_m);
-        Some(TableContact { pair, point_m, force_n: -self.force_n(), used: self.used() })
+        // A table is the second body; else the force is wanted on the second one.
+        let sign = match pair {
+            Pair::FingertipTable { .. } | Pair::ObjectTable { .. } | Pair::CapsuleTable { .. } => -1.0,
+            Pair::CapsuleObject { .. } | Pair::Parts { .. } => 1.0,
+            Pair::FingertipObject { .. } | Pair::Torsion { .. } | Pair::JointLimit { .. } => return None,
+        };
+        let force_n = self.force_n() * sign;
+        (self.normal_n > 0.0).then(|| OtherContact { pair, point_m, force_n, used: self.used() })
     }
 }
 

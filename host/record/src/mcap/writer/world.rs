@@ -55,7 +55,7 @@ impl Truth {
                 }
             }
             Self::Contacts => {
-                for (number, contacts) in [(2, world.contacts), (3, world.on_tables)] {
+                for (number, contacts) in [(2, world.contacts), (3, world.others)] {
                     for contact in contacts {
                         nested(bytes, number, |bytes| {
                             vector(bytes, 1, &contact.point_m);
@@ -88,8 +88,8 @@ pub struct World<'a> {
     pub torques_nm: &'a [f64],
     /// The contact of each finger, with the force on the object.
     pub contacts: &'a [Contact],
-    /// The contacts with tables, with the tables' forces.
-    pub on_tables: &'a [Contact],
+    /// All other contacts: with tables, of links, of parts of the hand with each other.
+    pub others: &'a [Contact],
 }
 
 /// A contact at a tick.
@@ -202,7 +202,7 @@ fn descriptors(schema: &str) -> Vec<u8> {
             ),
             message(
                 name,
-                vec![time, several(inner("contacts", 2, "Contact")), several(inner("tables", 3, "Contact"))],
+                vec![time, several(inner("contacts", 2, "Contact")), several(inner("others", 3, "Contact"))],
             ),
         ],
     };
