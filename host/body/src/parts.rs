@@ -1,5 +1,6 @@
 //! Properties of the parts: numbers that a scene gives, and a plant acts on.
 
+use blindgrasp_shared::math::Real;
 use nalgebra::{Matrix3, Vector3};
 
 /// The material of a fingertip.
@@ -13,6 +14,20 @@ pub struct FingertipModel {
     pub damping_n_s_m3: f64,
     /// Torsional viscosity `b_i` for each square metre of contact area, N m s/rad/m^2 = N s/m.
     pub torsion_n_s_m: f64,
+}
+
+impl FingertipModel {
+    /// The fingertip that gives way as this one and another one do that are pressed onto each other, each by its own law, with the
+    /// same force: `k_1 dr_1^2 = k_2 dr_2^2`, and their indentations add up.
+    pub fn onto(&self, other: &Self) -> Self {
+        let sum = 1.0 / self.stiffness_n_m2.square_root() + 1.0 / other.stiffness_n_m2.square_root();
+        Self {
+            radius_m: self.radius_m.min(other.radius_m),
+            stiffness_n_m2: 1.0 / (sum * sum),
+            damping_n_s_m3: 1.0 / (1.0 / self.damping_n_s_m3 + 1.0 / other.damping_n_s_m3),
+            torsion_n_s_m: 0.0,
+        }
+    }
 }
 
 /// The face that a fingertip rolls on, for the whole run (the paper's assumption 3).

@@ -408,7 +408,7 @@ impl Export<'_> {
             [i] => softness(&scene.fingertips[i], self.settled_m[i], yield_per_kg, self.step_s),
             [i, j] => {
                 let depth_m = self.settled_m[i] + self.settled_m[j];
-                let tip = between(&scene.fingertips[i], &scene.fingertips[j]);
+                let tip = scene.fingertips[i].onto(&scene.fingertips[j]);
                 softness(&tip, depth_m, yield_per_kg, self.step_s)
             }
             _ => hard.to_owned(),
@@ -437,17 +437,6 @@ impl Export<'_> {
 
 fn wxyz(turn: &UnitQuaternion<f64>) -> [f64; 4] {
     [turn.w, turn.i, turn.j, turn.k]
-}
-
-/// The fingertip that gives way as two that are pressed onto each other, each by its own law, with the same force.
-fn between(first: &FingertipModel, second: &FingertipModel) -> FingertipModel {
-    let sum: f64 = [first, second].map(|tip| 1.0 / tip.stiffness_n_m2.square_root()).iter().sum();
-    FingertipModel {
-        radius_m: first.radius_m.min(second.radius_m),
-        stiffness_n_m2: 1.0 / (sum * sum),
-        damping_n_s_m3: 1.0 / (1.0 / first.damping_n_s_m3 + 1.0 / second.damping_n_s_m3),
-        torsion_n_s_m: 0.0,
-    }
 }
 
 /// Depths at which the fingertips settle, m.

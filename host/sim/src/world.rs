@@ -50,6 +50,7 @@ pub fn world(scene: &Scene) -> Option<World> {
         fingertip_friction: scene.fingertip_friction.clone(),
         capsules: scene.capsules.clone(),
         capsule_friction: scene.capsule_friction.clone(),
+        hand_touches_itself: plant.links_touch(),
         tables: plant.tables.iter().map(|file| table(file, scene)).collect(),
         gravity_m_s2: turns.then(|| {
             let plant = plant.clone();

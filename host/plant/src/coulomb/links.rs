@@ -14,7 +14,7 @@ use crate::mass::MassFactor;
 use crate::model::PlantModel;
 use crate::vectors::Everything;
 use blindgrasp_body::polyhedron::{Critical, Touchable};
-use blindgrasp_body::{FingertipModel, MAX_JOINTS, Part, closest_of_lines, pairs};
+use blindgrasp_body::{MAX_JOINTS, Part, closest_of_lines, pairs};
 use blindgrasp_shared::math::{Real, norm};
 use nalgebra::Vector3;
 
@@ -89,14 +89,15 @@ impl Links {
                 });
             }
         }
-        for parts in pairs(hand, capsules) {
+        let pairs = if world.hand_touches_itself { pairs(hand, capsules) } else { Vec::new() };
+        for parts in pairs {
             let sliding = parts.map(|part| match part {
                 Part::Capsule(capsule) => world.capsule_friction[capsule],
                 Part::Fingertip(finger) => world.fingertip_friction[finger].sliding,
             });
             let material = match parts {
                 [Part::Fingertip(first), Part::Fingertip(second)] => {
-                    between(&model.fingertips[first], &model.fingertips[second])
+                    Material::of_fingertip(&model.fingertips[first].onto(&model.fingertips[second]))
                 }
                 [Part::Fingertip(soft), Part::Capsule(_)] | [Part::Capsule(_), Part::Fingertip(soft)] => {
                     Material::of_fingertip(&model.fingertips[soft])
@@ -245,19 +246,6 @@ fn gap_m(
             norm(&(at(0) - at(1))) - radii_m
         }
     }
-}
-
-/// Two fingertips against each other: each gives way by its own law, and the forces are the same.
-fn between(first: &FingertipModel, second: &FingertipModel) -> Material {
-    // f = k1 d1^2 = k2 d2^2 and d = d1 + d2 make f = k d^2 with 1 / sqrt(k) the sum of both.
-    let root = |tip: &FingertipModel| 1.0 / tip.stiffness_n_m2.square_root();
-    let sum = root(first) + root(second);
-    Material::of_fingertip(&FingertipModel {
-        radius_m: first.radius_m.min(second.radius_m),
-        stiffness_n_m2: 1.0 / (sum * sum),
-        damping_n_s_m3: 1.0 / (1.0 / first.damping_n_s_m3 + 1.0 / second.damping_n_s_m3),
-        torsion_n_s_m: 0.0,
-    })
 }
 
 /// The farthest from each joint that a point of the hand can be that it moves, m.

@@ -58,6 +58,8 @@ pub struct World {
     pub capsules: Vec<Capsule>,
     /// Coefficient of Coulomb friction of each of them against the object, and against the hand.
     pub capsule_friction: Vec<f64>,
+    /// Parts of the hand that are not joined touch each other, fingertips among them.
+    pub hand_touches_itself: bool,
     /// Gravity on hand and object, m/s^2, in place of the model's constants: of a hand that is turned or shaken.
     pub gravity_m_s2: Option<Path>,
 }

@@ -87,7 +87,7 @@ fn arms_stay_apart() {
         ];
         let mut model = model(hand(&fingers), object(Polyhedron::cuboid([0.05; 3]).unwrap(), 0.1));
         model.object_gravity_m_s2 = Vector3::zeros();
-        let mut world = world(2, vec![]);
+        let mut world = World { hand_touches_itself: true, ..world(2, vec![]) };
         if has_links {
             let link = |k: usize| Capsule {
                 link: Some(k),

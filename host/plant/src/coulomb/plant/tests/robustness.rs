@@ -104,6 +104,7 @@ fn any_scene(numbers: &mut Numbers, share: f64, kind: Kind) -> (Plant, Vec<f64>)
                 .map(|end_m| model.hand.prepared_joints()[link].from_link.tr_mul(&end_m));
             world.capsules.push(Capsule { link: Some(link), ends_m, radius_m: 0.008 });
         }
+        world.hand_touches_itself = true;
         let ends_m = [numbers.vector() * 2.0 * radius_m; 2];
         world.capsules.push(Capsule { link: None, ends_m, radius_m: 0.01 });
         world.capsule_friction = world.capsules.iter().map(|_| friction(numbers).sliding).collect();
