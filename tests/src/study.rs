@@ -49,8 +49,10 @@ pub struct Runs {
 
 /// The hand of the study, with all that does not depend on the object.
 pub struct Study {
-    /// The hand in the paper's own model.
+    /// The hand in the paper's own model, whose links are not looked at.
     pub hand: PlacingHand,
+    /// The same hand with links that touch.
+    with_links: PlacingHand,
     /// The same hand with encoders, delay, limits and friction.
     real: SceneFile,
 }
@@ -59,8 +61,11 @@ impl Default for Study {
     /// The paper's hand.
     fn default() -> Self {
         let file = |name: &str| Scene::load(name, &[DURATION.to_owned()]).expect("built in").file;
-        let hand = PlacingHand::of(file("cube-ideal")).expect("a built-in scene");
-        Self { hand, real: file("cube") }
+        let [mut paper, with_links] = [file("cube-ideal"), file("cube-ideal")];
+        paper.plant.links = Some(false);
+        let [hand, with_links] =
+            [paper, with_links].map(|like| PlacingHand::of(like).expect("a built-in scene"));
+        Self { hand, with_links, real: file("cube") }
     }
 }
 
@@ -96,12 +101,14 @@ impl Study {
     /// # Errors
     /// The reason for which it is not placed.
     pub fn on_a_table(&self, object: &ObjectFile, integral_nm_rad: f64) -> Result<[Summary; 3], String> {
-        let mut all = self.hand.place(object.clone(), 1).map_err(|none| none.to_string())?;
+        let mut all = self.with_links.place(object.clone(), 1).map_err(|none| none.to_string())?;
         let Placement { scene, quality } = all.swap_remove(0);
         let SceneFile { object, pose, contacts, .. } = scene.file;
         let real = SceneFile { object, pose, contacts, ..self.real.clone() };
         let scene = Scene::build(real).map_err(|error| error.to_string())?;
         let file = Placement { scene, quality }.on_a_table();
+        // Fingers that just touch stand otherwise than those that were placed.
+        Scene::build(file.clone()).map_err(|error| error.to_string())?;
         let [_, attitude_nm] = file.control.gains.grasp;
         Ok([(attitude_nm, 0.0), (0.0, 0.0), (0.0, integral_nm_rad)].map(|(attitude_nm, integral_nm_rad)| {
             let mut file = file.clone();

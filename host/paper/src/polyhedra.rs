@@ -68,7 +68,9 @@ impl Polyhedra {
 /// # Errors
 /// A built-in scene or a run that can't be done.
 pub fn grasped(count: usize, told: &(dyn Fn(&str) + Sync)) -> Result<Polyhedra, EvidenceError> {
-    let like = scene(RUN, "cube-ideal", &["duration_s=5.0".to_owned()])?.file;
+    // The paper knows no links.
+    let settings = ["duration_s=5.0", "plant.links=false"].map(str::to_owned);
+    let like = scene(RUN, "cube-ideal", &settings)?.file;
     let duration_s = like.duration_s;
     let hand = PlacingHand::of(like).map_err(|cause| EvidenceError::of(RUN, cause))?;
     let bodies = polyhedra(&mut Draw::new(SEED), count);

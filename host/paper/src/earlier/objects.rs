@@ -36,9 +36,9 @@ type Shape = (&'static str, fn() -> Result<SceneFile, EvidenceError>);
 pub(super) const SHAPES: [Shape; 3] =
     [("prism", || ideal("prism-ideal")), ("cube", || ideal("cube-ideal")), ("octahedron", octahedron)];
 
-/// Long enough for what is lost to be lost.
+/// Long enough for what is lost to be lost; the paper knows no links.
 fn ideal(name: &str) -> Result<SceneFile, EvidenceError> {
-    Ok(scene(RUN, name, &["duration_s=10".to_owned()])?.file)
+    Ok(scene(RUN, name, &["duration_s=10", "plant.links=false"].map(str::to_owned))?.file)
 }
 
 /// Returns the scene of an octahedron, where the search of `scene new` puts it.
