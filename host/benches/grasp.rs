@@ -4,7 +4,6 @@ use blindgrasp::body::dynamics::JointVector;
 use blindgrasp::body::{MAX_JOINTS, Posture};
 use blindgrasp::model::Scene;
 use blindgrasp::plant::Motion;
-use blindgrasp::plant::coulomb::{self, Friction, Path, Table};
 use blindgrasp::plant::integrator::Plant;
 use blindgrasp::sim::{self, Simulation};
 use blindgrasp_shared::command::{Command, Grasp};
@@ -170,42 +169,32 @@ fn plant(criterion: &mut Criterion) {
 /// A step of the plant with Coulomb friction at 0.5 ms: of the cube held at rest; of the same with a table under it; of the first
 /// moments of that, when contacts stick and slip in turn; and of fingers that slip. Only steps are timed: where it starts from
 /// is made ready before.
+/// With weight, links and palm: cube-table, at times at which the cube lies on the table, is taken, and is held; and slipping
+/// through fingertips without a table.
 fn plant_with_friction(criterion: &mut Criterion) {
     /// Steps from one start, during which constant torques change nothing of what is measured.
     const STEPS: u64 = 40;
-    const SUBSTEP_S: f64 = 5e-4;
-    let scene = cube();
-    let (start, law) = (beginning(&scene), law(&scene));
-    let lowest_m =
-        scene.object.vertices_m.iter().map(|vertex| (start.attitude * vertex).z).fold(0.0, f64::min);
-    let under = start.position_m + Vector3::z() * lowest_m;
-    for (name, sliding, has_table, settles_s) in [
-        ("held", 1.0, false, 2.0),
-        ("on a table", 1.0, true, 2.0),
-        ("settling on a table", 1.0, true, 0.0),
-        ("sliding", 0.02, false, 0.0),
+    for (name, friction, has_table, at_s) in [
+        ("held", None, true, 5.0),
+        ("on a table", None, true, 0.9),
+        ("settling on a table", None, true, 0.02),
+        ("sliding", Some(0.02), false, 0.02),
     ] {
-        let friction = Friction { sliding, torsion_m: 2e-3 };
-        let table = Table {
-            point_m: Path::constant(under),
-            normal: Vector3::z(),
-            object_friction: 0.5,
-            fingertip_friction: friction,
-        };
-        let world = coulomb::World {
-            fingertip_friction: vec![friction; F],
-            tables: if has_table { vec![table] } else { vec![] },
-            ..coulomb::World::default()
-        };
-        let mut model = sim::model(&scene);
-        model.object_gravity_m_s2 = Vector3::z() * -9.81;
-        model.joint_limits = true;
-        let mut begun = coulomb::Plant::new(model, world, start, SUBSTEP_S).expect("a plant");
-        for _ in 0..(settles_s / SUBSTEP_S) as u64 {
-            begun.solve(&law(begun.posture(), begun.motion())).expect("it does not diverge");
-            begun.advance();
+        let mut file = Scene::load("cube-table", &[]).expect("the built-in scene").file;
+        file.plant.friction = friction;
+        if !has_table {
+            file.plant.tables.clear();
         }
-        let torques = law(begun.posture(), begun.motion());
+        let mut simulation = Simulation::new(&Scene::build(file).expect("a scene")).expect("a plant");
+        let mut torques = [0.0; MAX_JOINTS];
+        while let Ok(Some(step)) = simulation.step()
+            && step.t_s < at_s
+        {
+            for (torque, applied) in torques.iter_mut().zip(step.sample.iter().flat_map(|s| &s.torques_nm)) {
+                *torque = *applied;
+            }
+        }
+        let begun = simulation.plant();
         criterion.bench_function(&format!("plant step with friction ({name})"), |bencher| {
             bencher.iter_custom(|steps| {
                 let mut time = Duration::ZERO;
@@ -224,7 +213,6 @@ fn plant_with_friction(criterion: &mut Criterion) {
     }
 }
 
-/// Whole runs, with the controller, and what is recorded.
 fn run(criterion: &mut Criterion) {
     let mut group = criterion.benchmark_group("sim");
     // Elements are simulated milliseconds.

@@ -187,6 +187,11 @@ impl<C: Controller> Simulation<C> {
         &self.controller
     }
 
+    /// The plant as it is.
+    pub fn plant(&self) -> &Plant {
+        &self.plant
+    }
+
     /// The next tick; `None` when time is over, or the grasp is lost. The first arms the hand, while everything stands still.
     ///
     /// # Errors

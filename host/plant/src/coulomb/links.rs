@@ -10,7 +10,7 @@ use super::placed::Placed;
 use super::stiffness::{hard, yields_per_kg};
 use super::touch::{Pair, Touch};
 use super::world::{Friction, World};
-use crate::mass::MassFactor;
+use crate::mass::{Branches, MassFactor};
 use crate::model::PlantModel;
 use crate::vectors::Everything;
 use blindgrasp_body::polyhedron::{Critical, Touchable};
@@ -39,6 +39,8 @@ struct Contact {
     meeting: Meeting,
     material: Material,
     friction: Friction,
+    /// The gap as it was measured last, m, less the ways gone since.
+    gap_m: f64,
 }
 
 /// All contacts that parts of a hand may have.
@@ -47,8 +49,10 @@ pub(super) struct Links {
     contacts: Vec<Contact>,
     /// Those that are near.
     near: Vec<usize>,
-    /// The least gap of all others, m, less the ways gone since it was measured.
+    /// The least gap of all others, m, less the ways gone since.
     gap_m: f64,
+    /// Ways gone since gaps were looked at, m.
+    gone_m: f64,
     /// The farthest that a joint moves a point of the hand when it turns, m/rad.
     reach_m: [f64; MAX_JOINTS],
 }
@@ -76,6 +80,7 @@ impl Links {
                 meeting: Meeting::Object(capsule),
                 material: hard(own + object_yields_per_kg, step_s),
                 friction: Friction { sliding, torsion_m: 0.0 },
+                gap_m: 0.0,
             });
             // Where no joint moves a capsule, a table can't come to it with any force.
             if capsules[capsule].link.is_none() {
@@ -86,6 +91,7 @@ impl Links {
                     meeting: Meeting::Table(capsule, t),
                     material: hard(own, step_s),
                     friction: Friction { sliding: table.object_friction, torsion_m: 0.0 },
+                    gap_m: 0.0,
                 });
             }
         }
@@ -105,15 +111,16 @@ impl Links {
                 _ => hard(parts.into_iter().map(yields).sum(), step_s),
             };
             let friction = Friction { sliding: sliding[0].min(sliding[1]), torsion_m: 0.0 };
-            contacts.push(Contact { meeting: Meeting::Parts(parts), material, friction });
+            contacts.push(Contact { meeting: Meeting::Parts(parts), material, friction, gap_m: 0.0 });
         }
-        Self { contacts, near: Vec::new(), gap_m: 0.0, reach_m: reach_m(model, world) }
+        Self { contacts, near: Vec::new(), gap_m: 0.0, gone_m: 0.0, reach_m: reach_m(model, world) }
     }
 
     /// Forgets what is far.
     #[cfg(test)]
     pub(super) fn forget(&mut self) {
         self.gap_m = 0.0;
+        self.contacts.iter_mut().for_each(|contact| contact.gap_m = 0.0);
     }
 
     /// Looks again at what may be near after half-step velocities have moved everything for a step.
@@ -121,36 +128,44 @@ impl Links {
         &mut self,
         placed: &Placed,
         (model, world): (&PlantModel, &World),
-        object: &Touchable,
-        (before, table_m): (&Everything, f64),
+        object: (&Touchable, f64),
+        (branches, before, table_m): (&Branches, &Everything, f64),
         (t_s, step_s): (f64, f64),
     ) {
         if self.contacts.is_empty() {
             return;
         }
-        let mut rate_m_s = 0.0;
-        for (speed, reach_m) in before.joints.iter().zip(&self.reach_m) {
-            rate_m_s += 2.0 * speed.magnitude() * reach_m;
-        }
+        let rate = |joints: &[usize]| {
+            let rates = joints.iter().map(|&k| before.joints[k].magnitude() * self.reach_m[k]);
+            rates.sum::<f64>()
+        };
+        let fastest_m_s = branches.fingers.iter().map(|finger| rate(finger)).fold(0.0, f64::max);
         let [x, y, z, a, b, c] = before.object;
-        rate_m_s +=
+        let object_m_s =
             norm(&Vector3::new(x, y, z)) + norm(&Vector3::new(a, b, c)) * model.object.shape.radius_m();
-        let moved_m = rate_m_s * step_s + table_m;
+        // Of two parts, or of one part and the object or a table.
+        let hand_m_s = rate(&branches.trunk) + fastest_m_s;
+        let moved_m = step_s * (hand_m_s + hand_m_s.max(object_m_s)) + table_m;
         self.gap_m -= moved_m;
+        self.gone_m += moved_m;
         let within_m = NEAR_M + 2.0 * moved_m;
         if self.gap_m > within_m {
             return;
         }
         self.near.clear();
         self.gap_m = f64::INFINITY;
-        for (k, contact) in self.contacts.iter().enumerate() {
-            let gap_m = gap_m(contact.meeting, placed, (model, world), object, t_s);
-            if gap_m < within_m + STAYS_M {
+        for (k, contact) in self.contacts.iter_mut().enumerate() {
+            contact.gap_m -= self.gone_m;
+            if contact.gap_m < within_m + STAYS_M {
+                contact.gap_m = gap_m(contact.meeting, placed, (model, world), object, t_s);
+            }
+            if contact.gap_m < within_m + STAYS_M {
                 self.near.push(k);
             } else {
-                self.gap_m = self.gap_m.min(gap_m);
+                self.gap_m = self.gap_m.min(contact.gap_m);
             }
         }
+        self.gone_m = 0.0;
     }
 
     /// Gives the contacts that are near.
@@ -164,7 +179,7 @@ impl Links {
     ) {
         let capsules = &world.capsules;
         for &k in &self.near {
-            let Contact { meeting, material, friction } = self.contacts[k];
+            let Contact { meeting, material, friction, .. } = self.contacts[k];
             let mut see_it = |touch: Touch| see(&Touch { material, friction, ..touch });
             match meeting {
                 Meeting::Object(capsule) => {
@@ -212,7 +227,7 @@ fn gap_m(
     meeting: Meeting,
     placed: &Placed,
     (model, world): (&PlantModel, &World),
-    object: &Touchable,
+    (object, object_radius_m): (&Touchable, f64),
     t_s: f64,
 ) -> f64 {
     let capsules = &world.capsules;
@@ -224,7 +239,7 @@ fn gap_m(
             let centre = [placed.position_m; 2];
             let [share, _] = closest_of_lines([&ends_m, &centre]);
             let apart_m = norm(&(ends_m[0] + (ends_m[1] - ends_m[0]) * share - placed.position_m));
-            let outside_m = apart_m - model.object.shape.radius_m() - radius_m;
+            let outside_m = apart_m - object_radius_m - radius_m;
             if outside_m > 10.0 * STAYS_M {
                 outside_m
             } else {

@@ -22,6 +22,8 @@ const LEAST_SHARE: f64 = 1e-6;
 #[derive(Clone, Debug)]
 pub(super) struct Surfaces {
     pub(super) object: Touchable,
+    /// Largest distance of the object's surface from its centre of mass, m.
+    pub(super) radius_m: f64,
     pub(super) materials: Materials,
     pub(super) links: Links,
     /// Room for the places where one ball touches.
@@ -129,7 +131,7 @@ impl Placed {
         mut see: impl FnMut(&Touch),
     ) {
         let hand = &model.hand;
-        let Surfaces { object, materials, places, links } = surfaces;
+        let Surfaces { object, radius_m: object_radius_m, materials, places, links } = surfaces;
         for (finger, material) in materials.fingertips.iter().enumerate() {
             let radius_m = model.fingertips[finger].radius_m;
             object.touches(&self.to_object(&self.posture.centres_m[finger]), radius_m + within_m, places);
@@ -153,6 +155,9 @@ impl Placed {
                     let point_m = centre_m - table.normal * height_m;
                     see(&Touch { pair, point_m, depth_m, friction, material: *material, ..under });
                 }
+            }
+            if table.normal.dot(&(self.position_m - origin_m)) - *object_radius_m > within_m {
+                continue;
             }
             for (corner, vertex_m) in model.object.shape.vertices_m.iter().enumerate() {
                 let corner_m = self.position_m + self.turned * vertex_m;

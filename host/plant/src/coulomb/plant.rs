@@ -74,7 +74,9 @@ pub struct Plant {
     felt: Vec<Four>,
     rates_m_s: Vec<f64>,
     guesses_m_s: Vec<f64>,
-    /// Velocities of the contacts' tables, as their rows feel them.
+    /// Mean velocities of the tables in the step before this instant, and around it, m/s.
+    table_velocities_m_s: Vec<[Vector3<f64>; 2]>,
+    /// Velocities of the contacts' tables about now, as their rows feel them.
     tables_m_s: Vec<Four>,
     /// Contacts that take away what others have too much.
     reliefs: Vec<Relief>,
@@ -126,6 +128,7 @@ impl Plant {
         let yields_per_kg = object_yields_per_kg(&model.object);
         let mut surfaces = Surfaces {
             object: Touchable::of(&model.object.shape),
+            radius_m: model.object.shape.radius_m(),
             materials: Materials::new(&model, substep_s),
             links: Links::new((&model, &world), &now, &mass, yields_per_kg, substep_s),
             places: Vec::new(),
@@ -151,6 +154,7 @@ impl Plant {
             felt: Vec::new(),
             rates_m_s: Vec::new(),
             guesses_m_s: Vec::new(),
+            table_velocities_m_s: Vec::new(),
             tables_m_s: Vec::new(),
             reliefs: Vec::new(),
             problem: Problem::default(),
@@ -169,8 +173,15 @@ impl Plant {
             world,
         };
         if motion == Motion::at_rest(motion.angles_rad, motion.position_m, motion.attitude) {
-            let Self { now, model, world, surfaces, stuck, before, .. } = &mut plant;
-            surfaces.links.update(now, (model, world), &surfaces.object, (before, 0.0), (0.0, substep_s));
+            let Self { now, model, world, surfaces, stuck, before, mass, .. } = &mut plant;
+            let moving = (&mass.branches, &*before, 0.0);
+            surfaces.links.update(
+                now,
+                (model, world),
+                (&surfaces.object, surfaces.radius_m),
+                moving,
+                (0.0, substep_s),
+            );
             now.touches((model, world), surfaces, 0.0, FAR_M, |touch| {
                 if touch.depth_m > 0.0 {
                     stuck.push(touch.pair);
@@ -391,8 +402,8 @@ impl Plant {
     /// Collects the contacts that touch or may touch within this step. Adds the forces of those that only take away.
     fn collect(&mut self, push: &mut Everything) {
         let (t_s, path_s) = (self.time_s(), self.path_s());
-        let fastest = head(&self.before.object).norm()
-            + tail(&self.before.object).norm() * self.model.object.shape.radius_m();
+        let fastest =
+            head(&self.before.object).norm() + tail(&self.before.object).norm() * self.surfaces.radius_m;
         let about_now = velocities(&self.motion);
         let Self {
             now,
@@ -404,6 +415,7 @@ impl Plant {
             rows,
             felt,
             rates_m_s,
+            table_velocities_m_s,
             reliefs,
             before,
             substep_s,
@@ -416,12 +428,20 @@ impl Plant {
         rates_m_s.clear();
         reliefs.clear();
         let far_m = FAR_M + 2.0 * *substep_s * fastest;
-        let way_m = |table: &Table| (table.point_m.at(t_s) - table.point_m.at(t_s - *substep_s)).norm();
-        let tables_m = world.tables.iter().map(way_m).fold(0.0, f64::max);
-        surfaces.links.update(now, (model, world), &surfaces.object, (before, tables_m), (t_s, *substep_s));
+        let h = *substep_s;
+        table_velocities_m_s.clear();
+        let mut tables_m = 0.0;
+        for Table { point_m, .. } in &world.tables {
+            let [last_m, now_m, next_m] = [t_s - h, t_s, t_s + h].map(|t_s| point_m.at(t_s));
+            tables_m = f64::max(tables_m, (now_m - last_m).norm());
+            let around = if *started { (next_m - last_m) / (2.0 * h) } else { (next_m - now_m) / h };
+            table_velocities_m_s.push([(now_m - last_m) / h, around]);
+        }
+        let moving = (&mass.branches, &*before, tables_m);
+        surfaces.links.update(now, (model, world), (&surfaces.object, surfaces.radius_m), moving, (t_s, h));
         let tau = 0.5 * *substep_s;
         now.touches((model, world), surfaces, t_s, far_m, |touch| {
-            let table_m_s = table_velocity(world, touch, (t_s - *substep_s, t_s));
+            let table_m_s = of_table(table_velocities_m_s, touch)[0];
             let own = room(rows, touches.len());
             now.set_rows((model, world), &mass.branches, touch, own);
             let feels = own.times(&mass.branches, before);
@@ -453,16 +473,14 @@ impl Plant {
 
     /// Sets rows, Delassus matrix and free velocities of the contacts, given whitened forces.
     fn set_problem(&mut self, tau: f64, push: &Everything) {
-        let (t_s, h) = (self.time_s(), self.substep_s);
-        let around_s = if self.started { (t_s - h, t_s + h) } else { (t_s, t_s + h) };
         let about_now = velocities(&self.motion);
-        let Self { world, touches, rows, felt, contacts, mass, problem, .. } = self;
+        let Self { table_velocities_m_s, touches, rows, felt, contacts, mass, problem, .. } = self;
         let branches = &mass.branches;
         problem.clear();
         self.guesses_m_s.clear();
         self.tables_m_s.clear();
         for (k, (touch, rows)) in touches.iter().zip(rows.iter_mut()).enumerate() {
-            let table_m_s = touch.feels(&table_velocity(world, touch, around_s));
+            let table_m_s = touch.feels(&of_table(table_velocities_m_s, touch)[1]);
             self.tables_m_s.push(table_m_s);
             self.guesses_m_s.push(-rows.times(branches, &about_now)[0] - table_m_s[0]);
             let mut free = felt[k];
@@ -503,12 +521,9 @@ fn respond(
     material.average(from_m, rate_m_s, path_s)
 }
 
-/// Mean velocity of a contact's table between two times, m/s; zero where there is none.
-fn table_velocity(world: &World, touch: &Touch, (from_s, to_s): (f64, f64)) -> Vector3<f64> {
-    touch.pair.table().map_or_else(Vector3::zeros, |table| {
-        let point_m = &world.tables[table].point_m;
-        (point_m.at(to_s) - point_m.at(from_s)) / (to_s - from_s)
-    })
+/// The velocities of a contact's table; zero where there is none.
+fn of_table(velocities_m_s: &[[Vector3<f64>; 2]], touch: &Touch) -> [Vector3<f64>; 2] {
+    touch.pair.table().map_or([Vector3::zeros(); 2], |table| velocities_m_s[table])
 }
 
 /// The rows of a contact, kept from one step to the next.

@@ -1,12 +1,13 @@
 //! The projection of velocities where contacts begin to stick.
 
-use super::{LEAST_PIVOT, Plant, couple, room, table_velocity};
+use super::{LEAST_PIVOT, Plant, couple, room};
 use crate::coulomb::linear::{add_scaled, dot};
 use crate::coulomb::touch::Touch;
 use crate::mass::ObjectMass;
 use crate::rotation::{solve_inertia, turn_freely};
 use crate::vectors::{Everything, add, head, set_tail, tail};
 use blindgrasp_body::MAX_JOINTS;
+use nalgebra::Vector3;
 
 impl Plant {
     /// Projects, where a contact begins to stick, the velocities of the half step ahead onto no slip of all that stick.
@@ -43,7 +44,13 @@ impl Plant {
             return;
         }
         projection.clear();
-        let table_m_s = |touch: &Touch| touch.feels(&table_velocity(world, touch, (t_s, t_s + h)));
+        let table_m_s = |touch: &Touch| {
+            let ahead = |table: usize| {
+                let point_m = &world.tables[table].point_m;
+                (point_m.at(t_s + h) - point_m.at(t_s)) / h
+            };
+            touch.feels(&touch.pair.table().map_or_else(Vector3::zeros, ahead))
+        };
         for (k, touch) in touches.iter().enumerate() {
             let own = room(rows, k);
             ahead.set_rows((model, world), &mass.branches, touch, own);
