@@ -278,7 +278,7 @@ optional double slipped_m = 4
 message Contacts
 {time}
 repeated Message .blindgrasp.Contact contacts = 2
-repeated Message .blindgrasp.Contact tables = 3
+repeated Message .blindgrasp.Contact others = 3
 schema blindgrasp.Link
 blindgrasp.proto proto3 package blindgrasp
 message Link
