@@ -51,6 +51,27 @@ fn what_is_grasped_on_a_table_is_held_without_it() {
     }
 }
 
+/// An L, which is not convex, in a hand that looks down: held with its weight, at rest, without creep. With links and without, since
+/// none of them is near.
+///
+/// Tolerances: as above.
+#[test]
+fn what_is_not_convex_is_held_with_its_weight() {
+    let weight = ["plant.contact=\"coulomb\"", "plant.gravity_m_s2=[0.0, 0.0, 9.81]"];
+    let (_, run_with) = run("l-bracket", &weight);
+    let (_, run_without) = run("l-bracket", &[&weight[..], &["plant.links=false"]].concat());
+    let (last, summary) = (run_with.samples.last().expect("samples"), &run_with.summary);
+    let creep_m_s = last.velocity_m_s.norm();
+    println!(
+        "ledger off by {:.1e}, {creep_m_s:.1e} m/s, slipped {:?}",
+        off(&run_with),
+        summary.last.slipped_m
+    );
+    assert_eq!((summary.outcome, summary.fault.as_ref()), (Outcome::Held, None));
+    assert!(summary.settled && off(&run_with) < 1e-3 && creep_m_s < 1e-9);
+    assert_eq!(last.position_m, run_without.samples.last().expect("samples").position_m);
+}
+
 /// The object lies on the table, and the whole of its weight on that, where fingertips have no friction.
 ///
 /// Tolerance: 1e-3 of the weight, once it has come to rest on its corners.

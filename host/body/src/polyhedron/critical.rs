@@ -224,7 +224,10 @@ impl Features {
             }
         }
         for corner in &self.corners {
-            let [share, _] = closest_of_lines([ends_m, &[corner.at_m; 2]]);
+            let share = along_m.dot(&(corner.at_m - ends_m[0])) / along_m.norm_squared();
+            if !is_within(share) {
+                continue;
+            }
             let away_m = ends_m[0] + along_m * share - corner.at_m;
             // Where an edge leads nearer to the line, it is the edge that it passes. Along an edge it passes both ends.
             let leads_nearer = |&(number, ends_here): &(usize, bool)| {
@@ -232,7 +235,7 @@ impl Features {
                 if ends_here { -along_m } else { along_m }
             };
             let none_m = ROUNDING * norm(&away_m);
-            if is_within(share) && corner.rays.iter().all(|ray| leads_nearer(ray) <= none_m) {
+            if corner.rays.iter().all(|ray| leads_nearer(ray) <= none_m) {
                 see(share);
             }
         }

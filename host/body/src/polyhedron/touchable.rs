@@ -6,6 +6,9 @@ use super::critical::{Critical, Features};
 use blindgrasp_shared::math::norm;
 use nalgebra::Vector3;
 
+/// Places of a line that there is room for at once.
+const MOST_PLACES: usize = 16;
+
 /// A polyhedron's surface. A convex body has a quicker way.
 #[derive(Clone, Debug)]
 pub struct Touchable {
@@ -65,17 +68,19 @@ impl Touchable {
     /// it passes the body's edges and vertices, the closest one and the next. With each the distance, m, from which on it touches. As
     /// two of them become one, the second's shrinks until it does not touch any more.
     pub fn supports(&self, ends_m: &[Vector3<f64>; 2], radius_m: f64) -> [(f64, f64); 2] {
-        let (first, _) = self.closest_to_line(ends_m);
+        let mut places = Vec::with_capacity(MOST_PLACES);
+        self.places_of(ends_m, |share, closest| places.push((share, closest.distance_m)));
+        let (first, _) = places.iter().fold((0.0, f64::INFINITY), |a, b| if b.1 < a.1 { *b } else { a });
         let length_m = norm(&(ends_m[1] - ends_m[0]));
         let (mut second, mut deepest_m) = ((first, f64::NEG_INFINITY), f64::NEG_INFINITY);
-        self.places_of(ends_m, |share, closest| {
+        for (share, distance_m) in places {
             let near = 1.0 - ((share - first).abs() * length_m / radius_m).min(1.0);
             let within_m = radius_m * (1.0 - near * near);
-            if within_m - closest.distance_m > deepest_m {
-                deepest_m = within_m - closest.distance_m;
+            if within_m - distance_m > deepest_m {
+                deepest_m = within_m - distance_m;
                 second = (share, within_m);
             }
-        });
+        }
         [(first, radius_m), second]
     }
 

@@ -20,7 +20,7 @@ use nalgebra::Vector3;
 
 /// Gap beyond what velocities close in two steps that a contact may have and still be looked at, m.
 const NEAR_M: f64 = 2e-4;
-/// Gap up to which a pair stays among those that are looked at each step, m.
+/// Gap up to which a pair is among those whose gap is followed in each step, m.
 const STAYS_M: f64 = 1e-3;
 
 /// What a part of the hand may meet.
@@ -47,8 +47,9 @@ struct Contact {
 #[derive(Clone, Debug)]
 pub(super) struct Links {
     contacts: Vec<Contact>,
-    /// Those that are near.
+    /// Those that are near; and of these, the ones that may touch.
     near: Vec<usize>,
+    touching: Vec<usize>,
     /// The least gap of all others, m, less the ways gone since.
     gap_m: f64,
     /// Ways gone since gaps were looked at, m.
@@ -113,7 +114,14 @@ impl Links {
             let friction = Friction { sliding: sliding[0].min(sliding[1]), torsion_m: 0.0 };
             contacts.push(Contact { meeting: Meeting::Parts(parts), material, friction, gap_m: 0.0 });
         }
-        Self { contacts, near: Vec::new(), gap_m: 0.0, gone_m: 0.0, reach_m: reach_m(model, world) }
+        Self {
+            contacts,
+            near: Vec::new(),
+            touching: Vec::new(),
+            gap_m: 0.0,
+            gone_m: 0.0,
+            reach_m: reach_m(model, world),
+        }
     }
 
     /// Forgets what is far.
@@ -146,29 +154,40 @@ impl Links {
         // Of two parts, or of one part and the object or a table.
         let hand_m_s = rate(&branches.trunk) + fastest_m_s;
         let moved_m = step_s * (hand_m_s + hand_m_s.max(object_m_s)) + table_m;
+        let within_m = NEAR_M + 2.0 * moved_m;
+        let measure = |meeting: Meeting| gap_m(meeting, placed, (model, world), object, t_s);
         self.gap_m -= moved_m;
         self.gone_m += moved_m;
-        let within_m = NEAR_M + 2.0 * moved_m;
-        if self.gap_m > within_m {
-            return;
-        }
-        self.near.clear();
-        self.gap_m = f64::INFINITY;
-        for (k, contact) in self.contacts.iter_mut().enumerate() {
-            contact.gap_m -= self.gone_m;
-            if contact.gap_m < within_m + STAYS_M {
-                contact.gap_m = gap_m(contact.meeting, placed, (model, world), object, t_s);
+        if self.gap_m <= within_m {
+            self.near.clear();
+            self.gap_m = f64::INFINITY;
+            for (k, contact) in self.contacts.iter_mut().enumerate() {
+                contact.gap_m -= self.gone_m;
+                if contact.gap_m < within_m + STAYS_M {
+                    contact.gap_m = measure(contact.meeting);
+                }
+                if contact.gap_m < within_m + STAYS_M {
+                    self.near.push(k);
+                } else {
+                    self.gap_m = self.gap_m.min(contact.gap_m);
+                }
             }
-            if contact.gap_m < within_m + STAYS_M {
-                self.near.push(k);
-            } else {
-                self.gap_m = self.gap_m.min(contact.gap_m);
+            self.gone_m = 0.0;
+        }
+        self.touching.clear();
+        for &k in &self.near {
+            let contact = &mut self.contacts[k];
+            contact.gap_m -= moved_m;
+            if contact.gap_m <= within_m {
+                contact.gap_m = measure(contact.meeting);
+            }
+            if contact.gap_m <= within_m {
+                self.touching.push(k);
             }
         }
-        self.gone_m = 0.0;
     }
 
-    /// Gives the contacts that are near.
+    /// Gives the contacts that may touch.
     pub(super) fn see(
         &self,
         placed: &Placed,
@@ -178,7 +197,7 @@ impl Links {
         see: &mut impl FnMut(&Touch),
     ) {
         let capsules = &world.capsules;
-        for &k in &self.near {
+        for &k in &self.touching {
             let Contact { meeting, material, friction, .. } = self.contacts[k];
             let mut see_it = |touch: Touch| see(&Touch { material, friction, ..touch });
             match meeting {
