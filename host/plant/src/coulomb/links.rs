@@ -149,8 +149,7 @@ impl Links {
         };
         let fastest_m_s = branches.fingers.iter().map(|finger| rate(finger)).fold(0.0, f64::max);
         let [x, y, z, a, b, c] = before.object;
-        let object_m_s =
-            norm(&Vector3::new(x, y, z)) + norm(&Vector3::new(a, b, c)) * model.object.shape.radius_m();
+        let object_m_s = norm(&Vector3::new(x, y, z)) + norm(&Vector3::new(a, b, c)) * object.1;
         // Of two parts, or of one part and the object or a table.
         let hand_m_s = rate(&branches.trunk) + fastest_m_s;
         let moved_m = step_s * (hand_m_s + hand_m_s.max(object_m_s)) + table_m;
