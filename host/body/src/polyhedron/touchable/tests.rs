@@ -189,7 +189,7 @@ fn no_point_of_a_line_is_closer() {
     for shape in [cube, body(&bracket()), body(&plate()), body(&pit())] {
         let surface = Touchable::of(&shape);
         let mut pierced = 0;
-        for _ in 0..1000 {
+        for _ in 0..300 {
             let ends = [numbers.vector() * 0.08, numbers.vector() * 0.08];
             let (share, closest) = surface.closest_to_line(&ends);
             let at = |share: f64| ends[0] + (ends[1] - ends[0]) * share;
@@ -201,7 +201,7 @@ fn no_point_of_a_line_is_closer() {
             assert!((near < 0.0) == (least < 0.0) || least.abs() < 1e-4, "{ends:?} {closest:?} {least}");
             pierced += usize::from(near < 0.0);
         }
-        assert!(pierced > 50, "{pierced}");
+        assert!(pierced > 15, "{pierced}");
     }
 }
 
