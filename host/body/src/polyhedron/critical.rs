@@ -35,6 +35,8 @@ pub struct Critical {
 #[derive(Clone, Debug)]
 pub(super) struct Features {
     faces: Vec<Face>,
+    /// A ball around each face: its centre and radius, m.
+    balls_m: Vec<(Vector3<f64>, f64)>,
     vertices_m: Vec<Vector3<f64>>,
     edges: Vec<Edge>,
     corners: Vec<Corner>,
@@ -135,7 +137,13 @@ impl Features {
                 }
             }
         }
+        let ball_m = |face: &Face| {
+            let centre_m = face.mean_corner_m(&shape.vertices_m);
+            let farthest_m = |far: f64, &k: &usize| far.max(norm(&(shape.vertices_m[k] - centre_m)));
+            (centre_m, face.corners.iter().fold(0.0, farthest_m))
+        };
         Self {
+            balls_m: shape.faces.iter().map(ball_m).collect(),
             faces: shape.faces.clone(),
             vertices_m: shape.vertices_m.clone(),
             edges,
@@ -153,22 +161,6 @@ impl Features {
     ) -> Critical {
         // The least square of the distance so far, of whichever side.
         let mut nearest = Nearest { squared: f64::INFINITY, critical: None };
-        for (feature, face) in self.faces.iter().enumerate() {
-            let distance_m = face.normal.dot(point_m) - face.distance_m;
-            let counts = distance_m > 0.0 && distance_m < within_m;
-            if !(counts || distance_m * distance_m < nearest.squared)
-                || !(face.margin_m(&self.vertices_m, point_m) > 0.0)
-            {
-                continue;
-            }
-            let foot_m = point_m - face.normal * distance_m;
-            let place = Closest { point_m: foot_m, normal: face.normal, distance_m };
-            let critical = Critical { feature, place, index: 1 };
-            nearest.look(critical);
-            if counts {
-                see(critical);
-            }
-        }
         let mut begun = self.faces.len();
         for (k, edge) in self.edges.iter().enumerate() {
             let from_m = point_m - edge.from_m;
@@ -202,6 +194,28 @@ impl Features {
                 if index != 0 && critical.place.distance_m > 0.0 {
                     see(critical);
                 }
+            }
+        }
+        // Last, since most faces are farther away than the nearest edge or vertex.
+        for (feature, face) in self.faces.iter().enumerate() {
+            let (centre_m, radius_m) = self.balls_m[feature];
+            let apart_m = norm(&(point_m - centre_m)) - radius_m;
+            if apart_m > within_m && apart_m * apart_m > nearest.squared {
+                continue;
+            }
+            let distance_m = face.normal.dot(point_m) - face.distance_m;
+            let counts = distance_m > 0.0 && distance_m < within_m;
+            if !(counts || distance_m * distance_m < nearest.squared)
+                || !(face.margin_m(&self.vertices_m, point_m) > 0.0)
+            {
+                continue;
+            }
+            let foot_m = point_m - face.normal * distance_m;
+            let place = Closest { point_m: foot_m, normal: face.normal, distance_m };
+            let critical = Critical { feature, place, index: 1 };
+            nearest.look(critical);
+            if counts {
+                see(critical);
             }
         }
         nearest.critical.unwrap_or(Critical {

@@ -54,6 +54,8 @@ pub(super) struct Links {
     gap_m: f64,
     /// Ways gone since gaps were looked at, m.
     gone_m: f64,
+    /// Gap beyond which nothing of the hand can touch the object, a table or another part within two steps, m.
+    pub(super) within_m: f64,
     /// The farthest that a joint moves a point of the hand when it turns, m/rad.
     reach_m: [f64; MAX_JOINTS],
 }
@@ -120,6 +122,7 @@ impl Links {
             touching: Vec::new(),
             gap_m: 0.0,
             gone_m: 0.0,
+            within_m: f64::INFINITY,
             reach_m: reach_m(model, world),
         }
     }
@@ -140,9 +143,6 @@ impl Links {
         (branches, before, table_m): (&Branches, &Everything, f64),
         (t_s, step_s): (f64, f64),
     ) {
-        if self.contacts.is_empty() {
-            return;
-        }
         let rate = |joints: &[usize]| {
             let rates = joints.iter().map(|&k| before.joints[k].magnitude() * self.reach_m[k]);
             rates.sum::<f64>()
@@ -154,6 +154,7 @@ impl Links {
         let hand_m_s = rate(&branches.trunk) + fastest_m_s;
         let moved_m = step_s * (hand_m_s + hand_m_s.max(object_m_s)) + table_m;
         let within_m = NEAR_M + 2.0 * moved_m;
+        self.within_m = within_m;
         let measure = |meeting: Meeting| gap_m(meeting, placed, (model, world), object, t_s);
         self.gap_m -= moved_m;
         self.gone_m += moved_m;
@@ -206,7 +207,7 @@ impl Links {
                     let supports = object.supports(&ends_m, capsules[capsule].radius_m);
                     for ((share, touches_m), is_second) in supports.into_iter().zip([false, true]) {
                         let centre_m = ends_m[0] + (ends_m[1] - ends_m[0]) * share;
-                        object.touches(&centre_m, touches_m + within_m, places);
+                        object.touches(&centre_m, touches_m + within_m.min(self.within_m), places);
                         let pair = |feature: usize| Pair::CapsuleObject { capsule, is_second, feature };
                         placed.ball_on_object(pair, touches_m, places, (&material, &friction), &mut *see);
                     }

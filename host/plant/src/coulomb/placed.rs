@@ -134,7 +134,8 @@ impl Placed {
         let Surfaces { object, radius_m: object_radius_m, materials, places, links } = surfaces;
         for (finger, material) in materials.fingertips.iter().enumerate() {
             let radius_m = model.fingertips[finger].radius_m;
-            object.touches(&self.to_object(&self.posture.centres_m[finger]), radius_m + within_m, places);
+            let touches_m = radius_m + within_m.min(links.within_m);
+            object.touches(&self.to_object(&self.posture.centres_m[finger]), touches_m, places);
             let pair = |feature: usize| Pair::FingertipObject { finger, feature };
             let friction = &world.fingertip_friction[finger];
             self.ball_on_object(pair, radius_m, places, (material, friction), &mut see);
