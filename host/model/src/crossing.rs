@@ -9,7 +9,7 @@ use nalgebra::Vector3;
 
 /// The key by which links touch.
 const KEY: &str = "plant.links";
-/// What to do where they can't.
+/// The remedy for links that can't.
 const REMEDY: &str = "move contacts or object, correct the hand's capsules, or set it to false";
 
 impl HandFile {

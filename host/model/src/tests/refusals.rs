@@ -136,7 +136,7 @@ fn a_hand_has_at_most_64_capsules() {
     );
 }
 
-/// Where links don't touch, only fingertips are in each other's way.
+/// With links switched off, only fingertips are in each other's way.
 #[test]
 fn links_may_be_inside_each_other_where_they_do_not_touch() {
     let (thick, deep) = ("hand.capsule.*.radius_m=0.03", "plant.table.1.point_m.3=0.3");

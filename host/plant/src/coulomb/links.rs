@@ -23,7 +23,7 @@ const NEAR_M: f64 = 2e-4;
 /// Gap up to which a pair is among those whose gap is followed in each step, m.
 const STAYS_M: f64 = 1e-3;
 
-/// What a part of the hand may meet.
+/// A thing that a part of the hand may meet.
 #[derive(Clone, Copy, Debug)]
 enum Meeting {
     /// A capsule and the object.

@@ -19,7 +19,7 @@ pub(super) struct Surfaces {
     written: Vec<Surface>,
     /// The shapes that touch nothing, with their links, in words.
     left_out: Vec<String>,
-    /// What stands in the file on them.
+    /// The text of the file on them.
     pub(super) comments: Vec<String>,
 }
 
