@@ -3,8 +3,8 @@
 
 use blindgrasp::model::file::{
     Actuators, CapsuleFile, ContactFile, Control, FileKey, FingertipFile, Friction, HandFile, JointFile,
-    MoveFile, ObjectFile, PlantSettings, PoseFile, PushFile, SceneFile, Sensors, ShakeFile, ShapeFile,
-    StartFile, TableFile, TurnFile,
+    MoveFile, ObjectFile, PlantSettings, PoseFile, PostureFile, PushFile, SceneFile, Sensors, ShakeFile,
+    ShapeFile, StartFile, TableFile, TurnFile,
 };
 use blindgrasp::model::{Scene, mesh};
 use blindgrasp::sim::Simulation;
@@ -331,8 +331,14 @@ fn the_examples_of_the_document_are_settings() {
 #[test]
 fn the_document_of_hands_leaves_out_no_key() {
     let page = std::fs::read_to_string(root().join("docs/hands.md")).expect("the page");
-    let plain = [names::<HandFile>(), names::<JointFile>(), names::<FingertipFile>(), names::<CapsuleFile>()]
-        .concat();
+    let plain = [
+        names::<HandFile>(),
+        names::<JointFile>(),
+        names::<FingertipFile>(),
+        names::<CapsuleFile>(),
+        names::<PostureFile>(),
+    ]
+    .concat();
     let table = |name: &str| page.contains(&format!("`[{name}]`")) || page.contains(&format!("`[[{name}]]`"));
     let missing: Vec<_> =
         plain.into_iter().filter(|name| !page.contains(&format!("`{name}`")) && !table(name)).collect();

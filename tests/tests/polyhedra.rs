@@ -246,8 +246,13 @@ fn the_whole_table_with_weight() {
 fn ring(fingers: usize) -> HandFile {
     let paper = HandFile::load("three-finger").expect("built in");
     let (first, tip) = (&paper.joints[..4], &paper.fingertips[0]);
-    let mut hand =
-        HandFile { joints: Vec::new(), fingertips: Vec::new(), capsules: Vec::new(), ..paper.clone() };
+    let mut hand = HandFile {
+        joints: Vec::new(),
+        fingertips: Vec::new(),
+        capsules: Vec::new(),
+        postures: Vec::new(),
+        ..paper.clone()
+    };
     let of_first = |capsule: &&CapsuleFile| {
         let is_below_it = capsule.to_m[1] == first[0].offset_m[1];
         capsule.link.as_ref().map_or(is_below_it, |link| link.starts_with("finger-1"))

@@ -114,7 +114,8 @@ impl Setup<'_> {
     }
 }
 
-fn stop_margin_rad(safety: &Safety, joint: &JointFile) -> f64 {
+/// Width of a joint's soft end stop, rad.
+pub(super) fn stop_margin_rad(safety: &Safety, joint: &JointFile) -> f64 {
     let [lower, upper] = joint.limits_rad;
     safety.stop_margin_rad.min((upper - lower) / 8.0)
 }

@@ -264,6 +264,9 @@ keys! {
         /// The surfaces of links and palm. In a file, keys of `[capsule_defaults]` stand for those that a capsule leaves out.
         #[serde(rename = "capsule", default, skip_serializing_if = "Vec::is_empty")]
         pub capsules: Vec<CapsuleFile>,
+        /// Postures that commands and scenes name.
+        #[serde(rename = "posture", default, skip_serializing_if = "Vec::is_empty")]
+        pub postures: Vec<PostureFile>,
     }
 }
 
@@ -406,6 +409,18 @@ keys! {
         /// Coefficient of its friction; the object's file may have a lower one.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         pub friction: Option<f64>,
+    }
+}
+
+keys! {
+    /// A named posture of a hand.
+    #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+    #[serde(deny_unknown_fields)]
+    pub struct PostureFile {
+        /// Its name: 1 to 15 small letters, digits and hyphens.
+        pub name: String,
+        /// An angle for each joint, in the order of the file, rad.
+        pub angles_rad: Vec<f64>,
     }
 }
 

@@ -4,8 +4,9 @@ use super::{
     JointParameters,
     build::control,
     check::{Refused, Result, all_within, fail, item, name, schema, within},
+    controller::stop_margin_rad,
     error::{SceneError, suggestion},
-    file::{CapsuleFile, FingertipFile, HandFile, InertiaFile, JointFile, SafetyKey, SceneFile},
+    file::{CapsuleFile, FingertipFile, HandFile, InertiaFile, JointFile, PostureFile, SafetyKey, SceneFile},
     object::{breaks_triangle, tensor},
 };
 use blindgrasp_body::Capsule;
@@ -26,6 +27,10 @@ const LARGEST: f64 = 1e6;
 
 /// The most capsules that a hand may have: each pair of them is looked at in each step.
 pub(crate) const MAX_CAPSULES: usize = 64;
+
+/// The most named postures that a hand may have, and characters of their names: a firmware has room for so many.
+const MAX_POSTURES: usize = 8;
+const LONGEST_POSTURE_NAME: usize = 15;
 
 /// Bounds on the radius of a capsule, m, ...
 const THINNEST_M: f64 = 1e-4;
@@ -72,12 +77,17 @@ impl Examined {
             fingertips.push(check_fingertip(fingertip, &|name| item("fingertip", i, name), &mut refused));
         }
         check_capsules(&file, &mut refused);
+        check_postures(&file, &mut refused);
         let mut numbers: Vec<usize> = (1..=joints.len()).collect();
         let hand = tree.filter(|_| is_placed).and_then(|Tree { parents, links, kept }| {
             numbers.retain(|number| kept.contains(&(number - 1)));
             file.joints = kept.iter().map(|&k| file.joints[k].clone()).collect();
             let is_kept = |name: &String| file.joints.iter().any(|joint| joint.name == *name);
             file.capsules.retain(|capsule| capsule.link.as_ref().is_none_or(is_kept));
+            file.postures.retain(|posture| is_complete(posture, joints.len()));
+            for posture in &mut file.postures {
+                posture.angles_rad = kept.iter().map(|&k| posture.angles_rad[k]).collect();
+            }
             // Parents and links are kept.
             let place = |k: usize| kept.partition_point(|&other| other < k);
             let parent = |k: usize| parents[k].map(place);
@@ -254,6 +264,57 @@ fn check_capsules(file: &HandFile, refused: &mut Refused) {
             within(&key("radius_m"), capsule.radius_m, THINNEST_M, THICKEST_M),
             within(&key("friction"), capsule.friction.unwrap_or_default(), 0.0, 100.0),
         ]);
+    }
+}
+
+/// Returns `true` if a posture has a number for each joint.
+fn is_complete(posture: &PostureFile, joint_count: usize) -> bool {
+    posture.angles_rad.len() == joint_count
+        && posture.angles_rad.iter().all(|angle_rad| angle_rad.is_finite())
+}
+
+/// Checks the named postures. A hand that is told to go to one stays clear of its soft end stops.
+fn check_postures(file: &HandFile, refused: &mut Refused) {
+    let count = file.postures.len();
+    if count > MAX_POSTURES {
+        let problem = format!("the hand has {count} postures: at most {MAX_POSTURES} are supported");
+        refused.take::<()>(fail("posture", problem, "leave some out"));
+        return;
+    }
+    for (p, posture) in file.postures.iter().enumerate() {
+        let (name, key) = (&posture.name, |of: &str| item("posture", p, of));
+        let is_plain = |c: char| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '-';
+        if !(1..=LONGEST_POSTURE_NAME).contains(&name.len()) || !name.chars().all(is_plain) {
+            let remedy =
+                format!("has to be 1 to {LONGEST_POSTURE_NAME} small letters (a to z), digits and hyphens");
+            refused.take::<()>(fail(key("name"), format!("`{name}` is not a name of a posture"), remedy));
+        } else if file.postures[..p].iter().any(|other| other.name == *name) {
+            refused.take::<()>(fail(key("name"), format!("`{name}` is there twice"), "rename one of them"));
+        }
+        let (angles, joints) = (posture.angles_rad.len(), file.joints.len());
+        if angles != joints {
+            let problem = format!("{angles} angles for {joints} joints");
+            let remedy = "give one for each joint, in the order of the file";
+            refused.take::<()>(fail(key("angles_rad"), problem, remedy));
+            continue;
+        }
+        for (k, (&angle_rad, joint)) in posture.angles_rad.iter().zip(&file.joints).enumerate() {
+            let ([lower, upper], margin_rad) = (joint.limits_rad, stop_margin_rad(&file.safety, joint));
+            // To six digits, inwards, so that what is told is what is taken.
+            let least = ((lower + margin_rad) * 1e6 - 1e-3).ceil() / 1e6;
+            let most = ((upper - margin_rad) * 1e6 + 1e-3).floor() / 1e6;
+            if angle_rad >= least && angle_rad <= most {
+                continue;
+            }
+            let place = if angle_rad >= lower && angle_rad <= upper {
+                "within the soft end stop"
+            } else {
+                "outside the limits"
+            };
+            let problem = format!("{angle_rad:?} is {place} of joint `{}`", joint.name);
+            let remedy = format!("has to be between {least:?} and {most:?}");
+            refused.take::<()>(fail(format!("{}.{}", key("angles_rad"), k + 1), problem, remedy));
+        }
     }
 }
 

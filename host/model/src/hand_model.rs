@@ -5,7 +5,7 @@ use super::{
     check::{Result, fail},
     controller::Setup,
     error::{Place, SceneError, one_line},
-    file::{Actuators, HandFile, JointFile, PlantSettings, Sensors},
+    file::{Actuators, HandFile, JointFile, PlantSettings, PostureFile, Sensors},
     library::{Document, Kind, is_path},
     open,
 };
@@ -30,6 +30,8 @@ pub struct HandModel {
     pub joint_names: Vec<String>,
     /// The controller's configuration; zero beyond the hand's joints.
     pub config: Config<MAX_JOINTS>,
+    /// Its named postures.
+    pub postures: Vec<PostureFile>,
     /// Torque at each joint for each volt at its amplifier, N m/V.
     pub torques_per_volt_nm_v: Vec<f32>,
     /// Oddities that can be used, in words.
@@ -165,8 +167,8 @@ impl HandModel {
         let joint_names = file.joints.iter().map(|joint| joint.name.clone()).collect();
         let per_volt = |joint: &JointFile| joint.torque_per_volt_nm_v as f32;
         let torques_per_volt_nm_v = file.joints.iter().map(per_volt).collect();
-        let (name, warnings) = (file.name.clone(), Vec::new());
-        Ok(Self { name, hand, joint_names, config, torques_per_volt_nm_v, warnings })
+        let (name, postures, warnings) = (file.name.clone(), file.postures.clone(), Vec::new());
+        Ok(Self { name, hand, joint_names, config, postures, torques_per_volt_nm_v, warnings })
     }
 }
 

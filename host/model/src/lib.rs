@@ -49,7 +49,8 @@ pub use draft::Draft;
 pub(crate) use error::one_line;
 pub use error::{Place, SceneError, suggestion};
 pub use file::{
-    Actuators, Control, Friction, HandFile, ObjectFile, PlantSettings, Safety, SceneFile, Sensors,
+    Actuators, Control, Friction, HandFile, ObjectFile, PlantSettings, PostureFile, Safety, SceneFile,
+    Sensors,
 };
 pub use hand::posture;
 pub(crate) use hand::{Examined, direction, still_joints};

@@ -374,8 +374,39 @@ fn capsules_lie_where_their_links_do() {
     assert!(without.capsules.is_empty() && without.capsule_friction.is_empty());
 }
 
+/// Open, a fingertip is 25 mm or more from the face that it touches in the scene of its hand; shaped for a grasp 10 to 15 mm, with the
+/// fingertips' middle in that of the object where the faces allow it. A scene keeps the postures, whatever it is read from.
+#[test]
+fn postures_of_built_in_hands_are_open_and_shaped_for_their_scenes() {
+    for (name, is_even) in [
+        ("cube", true),
+        ("two-finger-prism", true),
+        ("four-finger-cube", true),
+        ("allegro-like-prism", false),
+        ("hand-arm", false),
+    ] {
+        let scene = load(name, &[]).unwrap();
+        let postures = &scene.file.hand.postures;
+        assert_eq!(HandModel::load(&scene.file.hand.name).unwrap().postures, *postures);
+        assert_eq!(parse(&scene.effective_toml()).unwrap(), scene);
+        let [open, preshape] = &postures[..] else { panic!("{postures:?}") };
+        for (named, word, room_m) in [(open, "open", 0.025..0.061), (preshape, "preshape", 0.0099..0.0151)] {
+            assert_eq!(named.name, word);
+            let centres_m = posture(&scene.hand, &named.angles_rad).centres_m;
+            let centres_m = &centres_m[..scene.contacts.len()];
+            for (i, (contact, centre_m)) in scene.contacts.iter().zip(centres_m).enumerate() {
+                let centre_m = scene.start.attitude.inverse() * (centre_m - scene.start.position_m);
+                let away_m = -contact.frame.column(1).dot(&centre_m) - contact.distance_m;
+                assert!(room_m.contains(&(away_m - scene.hand.radius_m(i))), "{name}, {word}: {away_m}");
+            }
+            let middle_m = centres_m.iter().sum::<Vector3<f64>>() / centres_m.len() as f64;
+            assert!(!is_even || (middle_m - scene.start.position_m).norm() < 1e-4, "{name}: {middle_m}");
+        }
+    }
+}
+
 /// No capsule of a hand that is built in is in the way of another part, neither at the start of a scene nor at the nominal
-/// posture; and no pair of parts that may touch is so in most of a thousand random postures, as parts are that always overlap.
+/// posture or a named one; and no pair of parts that may touch is so in most of a thousand random postures, as parts are that always overlap.
 #[test]
 fn capsules_of_built_in_hands_are_apart() {
     let deepest_m = |file: &HandFile, hand: &Hand, angles_rad: &[f64]| {
@@ -395,7 +426,10 @@ fn capsules_of_built_in_hands_are_apart() {
     for name in HandFile::built_in() {
         let (file, hand, _) = HandFile::load_checked(name).unwrap();
         let nominal_rad: Vec<f64> = file.joints.iter().map(|joint| joint.nominal_rad).collect();
-        assert!(deepest_m(&file, &hand, &nominal_rad) < 0.0, "{name}");
+        let named = file.postures.iter().map(|posture| &posture.angles_rad);
+        for angles_rad in named.chain([&nominal_rad]) {
+            assert!(deepest_m(&file, &hand, angles_rad) < 0.0, "{name}");
+        }
         let (mut numbers, capsules) = (Numbers(1), file.capsules(&hand));
         let mut crossings: Vec<_> = pairs(&hand, &capsules).into_iter().map(|parts| (parts, 0)).collect();
         for _ in 0..1000 {

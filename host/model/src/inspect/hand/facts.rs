@@ -4,7 +4,7 @@ use super::meeting::{Meeting, Meetings};
 use super::reach::{Sense, extreme_m};
 use super::specimen::Specimen;
 use super::strength;
-use crate::file::{CapsuleFile, FingertipFile, JointFile};
+use crate::file::{CapsuleFile, FingertipFile, JointFile, PostureFile};
 use crate::{HandFile, posture};
 use blindgrasp_body::MAX_JOINTS;
 use nalgebra::Vector3;
@@ -76,6 +76,19 @@ pub struct CapsuleFacts {
     pub length_m: f64,
     /// Radius, m.
     pub radius_m: f64,
+}
+
+/// A named posture.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct PostureFacts {
+    /// Its name.
+    pub name: String,
+    /// An angle for each joint, rad.
+    pub angles_rad: Vec<f64>,
+    /// The middle of the fingertips' centres in the base frame, m.
+    pub middle_m: [f64; 3],
+    /// The distance of the nearest and of the farthest centre from there, m.
+    pub from_middle_m: [f64; 2],
 }
 
 /// The reach of a fingertip's centre.
@@ -189,6 +202,23 @@ pub(super) fn capsules(file: &HandFile) -> Vec<CapsuleFacts> {
         radius_m: capsule.radius_m,
     };
     file.capsules.iter().enumerate().map(facts).collect()
+}
+
+/// Returns the named postures.
+pub(super) fn postures(specimen: &Specimen) -> Vec<PostureFacts> {
+    let facts = |file: &PostureFile| {
+        let posture = posture(&specimen.hand, &file.angles_rad);
+        let middle_m = specimen.middle_m(&posture);
+        let away_m =
+            posture.centres_m[..specimen.fingers()].iter().map(|centre_m| (centre_m - middle_m).norm());
+        PostureFacts {
+            name: file.name.clone(),
+            angles_rad: file.angles_rad.clone(),
+            middle_m: middle_m.into(),
+            from_middle_m: [away_m.clone().fold(f64::INFINITY, f64::min), away_m.fold(0.0, f64::max)],
+        }
+    };
+    specimen.file.postures.iter().map(facts).collect()
 }
 
 /// Returns the reach of each fingertip.

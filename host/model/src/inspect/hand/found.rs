@@ -33,7 +33,7 @@ impl Found {
         }
         // The subject and the key are not said twice.
         let named = error.problem.strip_prefix(subject.as_str()).filter(|_| !subject.is_empty());
-        let what = match (named, error.key.rsplit('.').next()) {
+        let what = match (named, error.key.rsplit('.').find(|part| part.parse::<usize>().is_err())) {
             (Some(what), _) => what.trim_start_matches([':', ' ']).to_owned(),
             (None, Some(key)) if !error.problem.contains(key) => format!("{key}: {}", error.problem),
             (None, _) => error.problem,

@@ -22,7 +22,9 @@ use serde::Serialize;
 use specimen::Specimen;
 use std::ffi::OsStr;
 
-pub use facts::{CapsuleFacts, FingertipFacts, JointFacts, Masses, MeetingFacts, MeetingsFacts, Reach};
+pub use facts::{
+    CapsuleFacts, FingertipFacts, JointFacts, Masses, MeetingFacts, MeetingsFacts, PostureFacts, Reach,
+};
 
 /// The findings of a check of a hand. `--json` prints it.
 #[derive(Clone, Debug, Serialize)]
@@ -41,6 +43,8 @@ pub struct HandCheck {
     pub fingertips: Vec<FingertipFacts>,
     /// The capsules.
     pub capsules: Vec<CapsuleFacts>,
+    /// The named postures; empty where the tree is not known.
+    pub postures: Vec<PostureFacts>,
     /// The reach of the fingertips; empty where the tree is not known.
     pub reach: Vec<Reach>,
     /// The masses of the links; `None` where the tree is not known.
@@ -107,6 +111,7 @@ impl HandCheck {
             joints: facts::joints(&file, specimen),
             fingertips: facts::fingertips(&file, specimen),
             capsules: facts::capsules(&file),
+            postures: specimen.map_or(Vec::new(), facts::postures),
             reach: specimen.map_or(Vec::new(), facts::reaches),
             masses: specimen.map(facts::masses),
             meeting: meetings,
@@ -157,6 +162,7 @@ fn look(specimen: &Specimen, meetings: &meeting::Meetings, found: &mut Found) {
         shape::freedom,
         shape::overlaps,
         shape::crossings,
+        shape::postures,
         drive::torques,
         drive::speeds,
         drive::encoders,

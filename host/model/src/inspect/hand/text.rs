@@ -188,6 +188,13 @@ fn totals(check: &HandCheck, text: &mut String) {
             (None, None) => line("meeting", "none".into()),
         }
     }
+    for (k, posture) in check.postures.iter().enumerate() {
+        let [nearest, farthest] = posture.from_middle_m.map(|m| m * 1e3);
+        let (name, middle) = (&posture.name, point(&posture.middle_m));
+        let words =
+            format!("{name}: fingertips {nearest:.0} .. {farthest:.0} mm from their middle at {middle}");
+        line(if k == 0 { "postures" } else { "" }, words);
+    }
 }
 
 /// Three digits or more.

@@ -144,6 +144,7 @@ pub(in super::super) fn subject_of(file: &HandFile, key: &str) -> String {
     let name = match (list, index) {
         (Some("joint"), Some(k)) => file.joints.get(k).map(|joint| ("joint", &joint.name)),
         (Some("fingertip"), Some(i)) => file.fingertips.get(i).map(|tip| ("fingertip", &tip.name)),
+        (Some("posture"), Some(p)) => file.postures.get(p).map(|posture| ("posture", &posture.name)),
         _ => None,
     };
     match name {

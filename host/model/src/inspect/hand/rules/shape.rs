@@ -6,6 +6,7 @@ use super::super::specimen::Specimen;
 use super::{length, names};
 use crate::check::item;
 use crate::inspect::finding::{Finding, Severity};
+use crate::posture;
 use blindgrasp_body::{Part, closest_of_lines, overlap_m, pairs};
 use nalgebra::Vector3;
 
@@ -175,20 +176,35 @@ fn apart_m([p, q]: [&[Vector3<f64>; 2]; 2]) -> f64 {
     (p[0] + (p[1] - p[0]) * s - q[0] - (q[1] - q[0]) * t).norm()
 }
 
+/// The keys that say where surfaces of the hand are, but for the angles.
+const SURFACES: [&str; 7] = ["offset_m", "axis", "rotation_rpy_rad", "radius_m", "from_m", "to_m", "link"];
+
+/// Links, palm and fingertips inside each other in a named posture: no scene begins so, and a hand that goes there jams.
+pub(in super::super) fn postures(specimen: &Specimen, found: &mut Found) {
+    if !found.trusts(&SURFACES) {
+        return;
+    }
+    let (file, hand) = (&specimen.file, &specimen.hand);
+    let capsules = file.capsules(hand);
+    for (p, named) in file.postures.iter().enumerate() {
+        let posture = posture(hand, &named.angles_rad);
+        let overlaps = pairs(hand, &capsules).into_iter();
+        let overlaps = overlaps.map(|parts| (overlap_m(parts, hand, &posture, &capsules), parts));
+        let Some((overlap, parts)) = overlaps.max_by(|a, b| a.0.total_cmp(&b.0)) else { continue };
+        if overlap > 0.0 {
+            let [a, b] = parts.map(|part| file.part_in_words(part));
+            let what = format!("{a} and {b} overlap by {}", length(overlap));
+            let finding = Finding::new(Severity::Warning, what, "change its angles, or correct the capsules")
+                .about(format!("posture `{}`", named.name))
+                .key(item("posture", p, "angles_rad"));
+            found.push(finding);
+        }
+    }
+}
+
 /// Links, palm and fingertips inside each other at the nominal posture.
 pub(in super::super) fn crossings(specimen: &Specimen, found: &mut Found) {
-    let keys = [
-        "offset_m",
-        "axis",
-        "rotation_rpy_rad",
-        "limits_rad",
-        "radius_m",
-        "nominal_rad",
-        "from_m",
-        "to_m",
-        "link",
-    ];
-    if !found.trusts(&keys) {
+    if !found.trusts(&SURFACES) || !found.trusts(&["limits_rad", "nominal_rad"]) {
         return;
     }
     let (file, hand) = (&specimen.file, &specimen.hand);

@@ -90,6 +90,7 @@ fn too_few_and_too_many() {
         ]
     );
     let mut file = HandFile::load("three-finger").unwrap();
+    file.postures.clear();
     for k in 0..13 {
         let mut joint = file.joints[3].clone();
         joint.name = format!("more-{k}");
@@ -97,6 +98,49 @@ fn too_few_and_too_many() {
     }
     let told: Vec<String> = check(&file).findings.iter().map(|finding| finding.what.clone()).collect();
     assert_eq!(told, ["the hand has 25 joints: at most 24 are supported"]);
+}
+
+/// A posture is listed with where its fingertips are; what is wrong with it is told with its name.
+#[test]
+fn postures_are_listed_and_looked_at() {
+    let mut file = HandFile::load("three-finger").unwrap();
+    let good = check(&file);
+    let [open, preshape] = &good.postures[..] else { panic!("{:?}", good.postures) };
+    assert_eq!((open.name.as_str(), preshape.name.as_str()), ("open", "preshape"));
+    for (is, is_meant) in open.middle_m.iter().chain(&open.from_middle_m).zip([0.0, 0.0, 0.125, 0.075, 0.075])
+    {
+        assert!((is - is_meant).abs() < 2e-5, "{is}");
+    }
+    let shown = good.text();
+    assert!(
+        shown.contains("\npostures  open: fingertips 75 .. 75 mm from their middle at (0, 0, 125) mm\n"),
+        "{shown}"
+    );
+    // Two fingers curled onto each other.
+    for finger in [4, 8] {
+        file.postures[1].angles_rad[finger..finger + 4].copy_from_slice(&[0.0, 0.9, 0.9, 0.9]);
+    }
+    let crossed = check(&file);
+    assert_eq!(crossed.verdict, Verdict::Doubtful);
+    let [finding] = &crossed.findings.lines()[..] else { panic!("{}", crossed.text()) };
+    assert!(finding.contains(": posture `preshape`: ") && finding.contains(" overlap by "), "{finding}");
+    file.postures[0].name = "Open".into();
+    file.postures[0].angles_rad[1] = -1.3;
+    let end = "posture `Open`: `Open` is not a name of a posture; has to be 1 to 15 small letters (a to z), digits and hyphens";
+    let lines = check(&file).findings.lines();
+    assert!(lines[0].ends_with(end), "{lines:?}");
+    assert!(
+        lines[1].ends_with("posture `Open`: angles_rad: -1.3 is outside the limits of joint `finger-1-flex-1`; has to be between -1.1 and 1.5"),
+        "{lines:?}"
+    );
+    file.postures[1].angles_rad.pop();
+    assert!(
+        check(&file).findings.lines()[2].ends_with(
+            "posture `preshape`: angles_rad: 11 angles for 12 joints; give one for each joint, in the order of the file"
+        ),
+        "{}",
+        check(&file).text()
+    );
 }
 
 #[test]
