@@ -12,7 +12,7 @@ use crate::link::MOST_SENT;
 use crate::model::{FINGERS, JOINTS, params};
 use crate::semihosting::File;
 use blindgrasp_shared::command::{Command, Grasp};
-use blindgrasp_shared::control::{Latch, LawsConfig, Stance};
+use blindgrasp_shared::control::{Held, Latch, LawsConfig, Stance};
 use blindgrasp_shared::device::Inputs;
 use blindgrasp_shared::fault::Raised;
 use blindgrasp_shared::hand::Posture;
@@ -144,7 +144,7 @@ fn law(
     let mut joints = Swinging { params, tick: 0 };
     let mut posture = Posture::at_base();
     hand.forward_kinematics(&joints.angles_rad(), &mut posture);
-    let latch = Latch::of(&posture, &joints.angles_rad());
+    let (latch, held) = (Latch::of(hand, &posture, &joints.angles_rad()), Held::nothing());
     let speeds_rad_s = [0.3; JOINTS];
     let mut most = 0;
     for tick in 0..TICKS {
@@ -152,8 +152,14 @@ fn law(
         let angles_rad = joints.angles_rad();
         most = most.max(counter.instructions(|| {
             hand.forward_kinematics(black_box(&angles_rad), &mut posture);
-            let stance = Stance { hand, posture: &posture, angles_rad: &angles_rad };
-            black_box(laws.torques(&stance, black_box(&speeds_rad_s), Some(&laws.grip(&latch))));
+            let stance = Stance {
+                hand,
+                posture: &posture,
+                angles_rad: &angles_rad,
+                speeds_rad_s: black_box(&speeds_rad_s),
+                held: &held,
+            };
+            black_box(laws.torques(&stance, Some(&laws.grip(&latch))));
         }));
     }
     Ok(most)

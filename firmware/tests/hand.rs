@@ -27,7 +27,10 @@ fn the_model_is_the_hand_to_the_bit() {
     let hand: Hand<f32, JOINTS, FINGERS> = model.hand.fit().expect("it has this size").cast();
     assert_eq!(*params.hand(), hand);
     let mut buffer = [0; 8192];
-    assert_eq!(encode(params.hand(), params.config(), &torques_per_volt_nm_v(), &mut buffer), Ok(MODEL));
+    assert_eq!(
+        encode(params.hand(), params.postures(), params.config(), &torques_per_volt_nm_v(), &mut buffer),
+        Ok(MODEL)
+    );
 }
 
 #[test]

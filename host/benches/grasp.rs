@@ -7,7 +7,8 @@ use blindgrasp::plant::Motion;
 use blindgrasp::plant::integrator::Plant;
 use blindgrasp::sim::{self, Simulation};
 use blindgrasp_shared::command::{Command, Grasp};
-use blindgrasp_shared::control::{Chosen, Hold, Latch, LawsConfig, Stance};
+use blindgrasp_shared::control::{Chosen, FrameConfig, Held, Hold, Latch, LawsConfig, Stance};
+use blindgrasp_shared::cycle::CycleConfig;
 use blindgrasp_shared::estimate::{Encoder, EstimatorConfig};
 use blindgrasp_shared::fault::FaultConfig;
 use blindgrasp_shared::hand::{Hand, Posture as PostureOf};
@@ -40,6 +41,7 @@ fn laws(scene: &Scene) -> LawsConfig<f32, J> {
     LawsConfig {
         gains: scene.control.gains.map(|&gain| gain as f32),
         chosen: Chosen::ALL,
+        frame: FrameConfig::least(),
         hold: Hold {
             damping_nm_s: std::array::from_fn(|k| scene.joints[k].damping_gain_nm_s_rad as f32),
             gravity_m_s2: Some(Vector3::new(0.0, 0.0, -9.81)),
@@ -57,7 +59,7 @@ fn controller(criterion: &mut Criterion) {
     let laws = config.prepare(&hand).expect("gains");
     let mut posture = PostureOf::at_base();
     hand.forward_kinematics(&angles, &mut posture);
-    let latch = Latch::of(&posture, &angles);
+    let (latch, held) = (Latch::of(&hand, &posture, &angles), Held::nothing());
     let speeds = [0.01; J];
     criterion.bench_function("forward kinematics (f32, 12 joints)", |bencher| {
         bencher.iter(|| hand.forward_kinematics(black_box(&angles), &mut posture));
@@ -65,8 +67,14 @@ fn controller(criterion: &mut Criterion) {
     criterion.bench_function("law with gravity (f32, 12 joints)", |bencher| {
         let grip = laws.grip(&latch);
         bencher.iter(|| {
-            let stance = Stance { hand: &hand, posture: black_box(&posture), angles_rad: &angles };
-            laws.torques(&stance, black_box(&speeds), Some(&grip))
+            let stance = Stance {
+                hand: &hand,
+                posture: black_box(&posture),
+                angles_rad: &angles,
+                speeds_rad_s: black_box(&speeds),
+                held: &held,
+            };
+            laws.torques(&stance, Some(&grip))
         });
     });
 
@@ -84,6 +92,7 @@ fn controller(criterion: &mut Criterion) {
         },
         faults: FaultConfig { possible_speed_rad_s: Some([200.0; J]), ..FaultConfig::LEAST },
         supervisor: SupervisorConfig { release_ms: 300, ..SupervisorConfig::LEAST },
+        cycle: CycleConfig::LEAST,
     };
     let params = Params::new(hand, &config).expect("parameters");
     let mut state = State::new();
@@ -127,10 +136,11 @@ fn law(scene: &Scene) -> impl Fn(&Posture, &Motion) -> JointVector {
     let angles = beginning(scene).angles_rad;
     let mut posture = Posture::at_base();
     scene.hand.forward_kinematics(&angles, &mut posture);
-    let latch = Latch::of(&posture, &angles);
+    let (latch, held) = (Latch::of(&scene.hand, &posture, &angles), Held::nothing());
     move |posture, motion| {
-        let stance = Stance { hand: &scene.hand, posture, angles_rad: &motion.angles_rad };
-        laws.torques(&stance, &motion.speeds_rad_s, Some(&laws.grip(&latch))).0
+        let Motion { angles_rad, speeds_rad_s, .. } = motion;
+        let stance = Stance { hand: &scene.hand, posture, angles_rad, speeds_rad_s, held: &held };
+        laws.torques(&stance, Some(&laws.grip(&latch))).0
     }
 }
 

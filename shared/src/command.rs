@@ -22,6 +22,40 @@ pub enum Command {
     Stop,
     /// Leave the fault, once its cause is gone.
     ClearFault,
+    /// Say where a joint is to be in the posture that is aimed at. Nothing moves.
+    Aim {
+        /// The joint.
+        joint: u8,
+        /// Its angle, rad.
+        angle_rad: f32,
+    },
+    /// Move to a posture, and hold it.
+    Posture {
+        /// Its number in the hand's file; `None` for the one that is aimed at.
+        posture: Option<u8>,
+        /// Time for the way, ms; 0 for the shortest that the limits allow.
+        time_ms: u16,
+    },
+    /// Move what is held.
+    Move(Move),
+    /// Put down what is held.
+    PutDown,
+    /// Weigh what is held.
+    Weigh,
+}
+
+/// A way of what is held, from where it was when the grasp began. Several in a row are followed smoothly: each is begun from
+/// where the last has come to, and the last is held.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Move {
+    /// Its position, m, in the base frame.
+    pub position_m: [f32; 3],
+    /// Its turn: a rotation vector, rad, in the base frame.
+    pub turn_rad: [f32; 3],
+    /// The point that it is turned about, m, from the middle of the fingertips when the grasp began.
+    pub about_m: [f32; 3],
+    /// Time for the way, ms; 0 for the shortest that the limits allow.
+    pub time_ms: u16,
 }
 
 /// The gains of a grasp; a gain that is left out is as configured.
@@ -38,16 +72,24 @@ impl Grasp {
 
 impl Command {
     /// Bytes that suffice for every command.
-    pub const MOST_BYTES: usize = 1 + GAIN_COUNT * (1 + 4);
+    pub const MOST_BYTES: usize = {
+        let (grasp, movement) = (GAIN_COUNT * (1 + 4), 9 * 4 + 3);
+        1 + if grasp > movement { grasp } else { movement }
+    };
 
     /// Every command.
-    pub const ALL: [Self; 6] = [
+    pub const ALL: [Self; 11] = [
         Self::Arm,
         Self::Disarm,
         Self::Grasp(Grasp::CONFIGURED),
         Self::Release,
         Self::Stop,
         Self::ClearFault,
+        Self::Aim { joint: 0, angle_rad: 0.0 },
+        Self::Posture { posture: None, time_ms: 0 },
+        Self::Move(Move { position_m: [0.0; 3], turn_rad: [0.0; 3], about_m: [0.0; 3], time_ms: 0 }),
+        Self::PutDown,
+        Self::Weigh,
     ];
 
     /// Its name in words.
@@ -59,6 +101,11 @@ impl Command {
             Self::Release => "release",
             Self::Stop => "stop",
             Self::ClearFault => "clear fault",
+            Self::Aim { .. } => "aim",
+            Self::Posture { .. } => "posture",
+            Self::Move(_) => "move",
+            Self::PutDown => "put down",
+            Self::Weigh => "weigh",
         }
     }
 }
@@ -118,6 +165,17 @@ refusals! {
     NoStore            = "this hand has nothing to save to: an emulator has no flash";
     NoSpare            = "no room is left to save to: a reset of the board makes some";
     NotSaved           = "the flash did not take it; what was saved before is valid";
+    Closing            = "the fingertips are closing: wait for their touch, release, or stop";
+    NotCarrying        = "nothing is held firmly: grasp first, and wait until the hand is carrying";
+    PuttingDown        = "what is held is being put down: wait for the end, release, or stop";
+    Weighing           = "what is held is being weighed: wait for the end, release, or stop";
+    NoSuchPosture      = "this hand has no posture of this number";
+    NoSuchJoint        = "this hand has no joint of this number";
+    BeyondRange        = "an angle is beyond the range of its joint, or in the margin of its end stop";
+    NoPath             = "this hand's file gives no speed to move at: see its section `moving`";
+    TooFast            = "the way is too far for its time: give it longer, or 0 for the shortest";
+    TooFar             = "the way, or the turn, is longer than the hand's file allows";
+    NoGravity          = "this hand is not told where down is: see `gravity_m_s2`";
 }
 
 impl fmt::Display for Refusal {

@@ -20,6 +20,7 @@
 //! - `V` is the sum of the potentials of the laws' gains, less the potential energy of the links' weight that is held. Each
 //!   but the last is its gain times a function of the posture. Gains that change (soft start, release) give and take potential
 //!   without any work: the drop is taken at the gains of the tick before.
+//! - A **target** that moves raises a potential, and what the joints then do for it was not fed by delays: it is taken off.
 //! - **Turns** are those of the counts themselves: the filter's angles are late. Over a way they err by a count in all,
 //!   however long it is.
 //! - **Torques** are the mean of the last two. What a tick computes acts from its end, or from the next tick on, as the
@@ -138,10 +139,10 @@ impl<const J: usize> Ledger<J> {
         let drop = drops.iter().fold(0.0, |sum, drop| sum + drop) + weight.drop_since(&self.weight);
         (self.terms, self.weight) = (terms, weight);
         match entry.law {
-            Some(&Account { damping_w, .. }) => {
+            Some(&Account { damping_w, fed_j, .. }) => {
                 self.damped.add(damping_w * entry.period_s);
                 // A first-order fade with a time constant of one second.
-                self.excess_j += work - drop - self.excess_j * entry.period_s;
+                self.excess_j += work - drop - fed_j - self.excess_j * entry.period_s;
             }
             // What feeds it is gone.
             None => self.excess_j = 0.0,

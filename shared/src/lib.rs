@@ -16,6 +16,7 @@ mod array;
 pub mod bytes;
 pub mod command;
 pub mod control;
+pub mod cycle;
 pub mod device;
 pub mod estimate;
 pub mod event;

@@ -1,14 +1,15 @@
 //! A hand and its configuration as bytes: what a firmware is built with.
 //!
 //! ```text
-//! postcard of (outputs, hand, angle of a count of each encoder, tick period, every parameter in the order of its number and its index) | CRC-32
+//! postcard of (outputs, hand, named postures, angle of a count of each encoder, tick period, every parameter in the order of its number and its index) | CRC-32
 //! ```
 //!
 //! A parameter that is switched off is not a number. The bytes do not depend on the capacity that the hand is held in, and
 //! keep every bit of every number. Their CRC is the hand's hash: equal hands have equal firmware.
 
 use crate::bytes::BufferTooSmall;
-use crate::control::{Chosen, Hold, LawsConfig, PerGain};
+use crate::control::{Chosen, FrameConfig, Hold, LawsConfig, PerGain};
+use crate::cycle::{CycleConfig, Postures};
 use crate::estimate::{Encoder, EstimatorConfig};
 use crate::fault::FaultConfig;
 use crate::hand::Hand;
@@ -55,13 +56,14 @@ struct Head<const J: usize> {
     period_us: u32,
 }
 
-/// Writes a hand, its configuration, and the torque at each joint for each volt at its amplifier, N m/V, into a buffer;
+/// Writes a hand, its postures, its configuration, and the torque at each joint for each volt at its amplifier, N m/V, into a buffer;
 /// returns the bytes.
 ///
 /// # Errors
 /// The buffer is too small.
 pub fn encode<'b, const J: usize, const F: usize>(
     hand: &Hand<f32, J, F>,
+    postures: &Postures<J>,
     config: &Config<J>,
     torques_per_volt_nm_v: &[f32],
     buffer: &'b mut [u8],
@@ -70,8 +72,9 @@ pub fn encode<'b, const J: usize, const F: usize>(
     let rad_per_count = config.estimator.encoders.map(|encoder| encoder.rad_per_count);
     let head =
         Head { rad_per_count: List::first_of(rad_per_count, joint_count), period_us: config.period_us };
-    let mut length =
-        postcard::to_slice(&(torques_per_volt_nm_v, hand, head), buffer).map_err(|_| BufferTooSmall)?.len();
+    let mut length = postcard::to_slice(&(torques_per_volt_nm_v, hand, postures, head), buffer)
+        .map_err(|_| BufferTooSmall)?
+        .len();
     for (parameter, index) in places(joint_count) {
         let value = config.value(joint_count, parameter, index).ok().flatten().unwrap_or(f32::NAN);
         let rest = buffer.get_mut(length..).ok_or(BufferTooSmall)?;
@@ -95,9 +98,12 @@ pub fn decode<const J: usize, const F: usize>(bytes: &[u8]) -> Result<Params<J, 
     if output_count != hand.joint_count() {
         return Err(ModelError::Malformed);
     }
+    let postures = read_postures(&mut reader)?;
     let config = read_config(&mut reader, hand.joint_count())?;
     match reader.finalize() {
-        Ok([]) => Params::new(hand, &config).map_err(ModelError::Parameter),
+        Ok([]) => Params::new(hand, &config)
+            .and_then(|params| params.with_postures(postures))
+            .map_err(ModelError::Parameter),
         _ => Err(ModelError::Malformed),
     }
 }
@@ -135,6 +141,11 @@ fn read_hand<const J: usize, const F: usize>(reader: &mut Reader<'_>) -> Result<
 }
 
 #[inline(never)]
+fn read_postures<const J: usize>(reader: &mut Reader<'_>) -> Result<Postures<J>, ModelError> {
+    Postures::deserialize(reader).map_err(|_| ModelError::Malformed)
+}
+
+#[inline(never)]
 fn read_config<const J: usize>(reader: &mut Reader<'_>, joint_count: usize) -> Result<Config<J>, ModelError> {
     let head = Head::deserialize(&mut *reader).map_err(|_| ModelError::Malformed)?;
     let mut config = least(&head);
@@ -159,11 +170,13 @@ fn least<const J: usize>(head: &Head<J>) -> Config<J> {
         laws: LawsConfig {
             gains: PerGain::all(0.0),
             chosen: Chosen::NONE,
+            frame: FrameConfig::least(),
             hold: Hold { damping_nm_s: [0.0; J], gravity_m_s2: None },
         },
         limits: LimitConfig::NONE,
         faults: FaultConfig::LEAST,
         supervisor: SupervisorConfig::LEAST,
+        cycle: CycleConfig::LEAST,
     }
 }
 

@@ -7,6 +7,7 @@
 use crate::bytes::BufferTooSmall;
 use crate::command::{Answer, Command, Grasp, Refusal};
 use crate::control::{GAIN_COUNT, GAINS, PerGain, PerSignal, SIGNAL_COUNT, SIGNALS, Signal};
+use crate::cycle::{Notice, Noticed};
 use crate::event::{Event, Events};
 use crate::fault::{Fault, Raised};
 use crate::limit::Limiting;
@@ -18,7 +19,7 @@ use serde::{Deserialize, Serialize};
 
 /// Version of everything that goes over the wire. Two ends talk when theirs are equal; it has nothing to do with the
 /// release's version.
-pub const INTERFACE_VERSION: u16 = 5;
+pub const INTERFACE_VERSION: u16 = 6;
 
 /// An error in the bytes of a record.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -63,6 +64,8 @@ pub enum Kind {
     Answer,
     /// The limit that acts on a torque.
     Limiting,
+    /// A thing that was noticed, or none.
+    Notice,
 }
 
 /// The value of a signal.
@@ -88,6 +91,8 @@ pub enum Value<'a> {
     Answer(Answer),
     /// The limit that acts on a torque.
     Limiting(Limiting),
+    /// A thing that was noticed.
+    Notice(Noticed),
     /// A count for each joint.
     Counts(&'a [i32]),
     /// A real number for each joint.
@@ -121,6 +126,7 @@ impl fmt::Display for Value<'_> {
             Self::Joint(joint) => write!(f, "joint {joint}"),
             Self::Answer(answer) => answer.fmt(f),
             Self::Limiting(limiting) => limiting.fmt(f),
+            Self::Notice(noticed) => noticed.fmt(f),
             Self::Counts(values) => fmt::Debug::fmt(values, f),
             Self::Reals(values) => fmt::Debug::fmt(values, f),
             Self::Limits(values) => fmt::Debug::fmt(values, f),
@@ -314,6 +320,31 @@ impl Field for Option<Raised> {
     }
 }
 
+/// A notice with its fingertip. Kept as its number from 1 on, whether there is a fingertip,
+/// and which.
+impl Field for Option<Noticed> {
+    const BLANK: Self = None;
+    const MOST_BYTES: usize = OPTION + 1 + OPTION + 1;
+    type Kept = (u8, bool, u8);
+    const KEPT: (u8, bool, u8) = (0, false, 0);
+
+    fn keep(&self) -> Self::Kept {
+        self.map_or(Self::KEPT, |Noticed { notice, fingertip }| {
+            (notice as u8 + 1, fingertip.is_some(), fingertip.unwrap_or(0))
+        })
+    }
+
+    fn kept(&(number, has_fingertip, fingertip): &Self::Kept) -> Self {
+        let notice = Notice::ALL.get(usize::from(number).checked_sub(1)?).copied()?;
+        Some(Noticed { notice, fingertip: has_fingertip.then_some(fingertip) })
+    }
+
+    fn tell<'a>(&'a self, named: fn(usize) -> Signal, to: &mut impl FnMut(Told<'a>)) {
+        let value = self.map_or(Value::Missing, Value::Notice);
+        to(Told { signal: named(0), kind: Kind::Notice, each: Each::Hand, value });
+    }
+}
+
 /// Kept with 0 for no answer, 1 for done, and from 2 on the refusals.
 impl Field for Option<Answer> {
     const BLANK: Self = None;
@@ -411,6 +442,7 @@ signals! {
     mode: Mode                      = one!("mode", "", "Mode");
     fault: Option<Raised>           = fault!("fault", "Fault that the hand is in");
     answer: Option<Answer>          = one!("answer", "", "Command of this tick, done or refused");
+    notice: Option<Noticed>         = one!("notice", "", "What the tick noticed by itself");
     events: Events                  = |_| Signal { key: "", unit: "", words: "" };
     reading_failed: Option<Raised>  = fault!("reading_failed", "Fault for which the joints could not be read or driven; with counts, they have passed their self-test since");
     gains: PerGain<f32>             = |k| GAINS[k].signal();
@@ -419,6 +451,7 @@ signals! {
     work_j: f32                     = one!("work_j", "J", "Work of the motors since the last grasp began");
     damped_j: f32                   = one!("damped_j", "J", "Energy that the damping has taken since the last grasp began");
     excess_j: f32                   = one!("excess_j", "J", "Work of the motors in the last second (fading) beyond the drop of the laws' potentials");
+    weight_n: f32                   = one!("weight_n", "N", "Weight that was weighed last");
     cycles: u32                     = one!("cycles", "cycles", "Processor cycles of the tick before, with reading and writing the joints; 0 where nothing counts them");
     late_ticks: u32                 = one!("late_ticks", "", "Ticks that were late since the start");
     dropped: u32                    = one!("dropped", "", "Records and parts of snapshots that the device lost since its start because a queue was full");
@@ -453,7 +486,7 @@ impl<const J: usize> Record<J> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::command::{Command, Grasp, Refusal};
+    use crate::command::{Command, Grasp, Move, Refusal};
     use crate::event::Event;
     use crate::fault::Fault;
     use crate::limit::Limit;
@@ -483,6 +516,7 @@ mod tests {
             mode: Mode::Fault,
             fault: Some(Raised::at(2, Fault::CountJump)),
             answer: Some(Answer { command: Command::ClearFault, refused: Some(Refusal::FaultPersists) }),
+            notice: Some(Noticed::at(1, Notice::NeverTouched)),
             events: Events::NONE.with(Event::Late, true),
             reading_failed: Some(Raised::at(2, Fault::SampleMissing)),
             gains: of_laws([5.0, 0.005], 0.375),
@@ -491,6 +525,7 @@ mod tests {
             work_j: -0.5,
             damped_j: 0.03125,
             excess_j: 0.0625,
+            weight_n: 0.75,
             cycles: 20_000,
             late_ticks: 2,
             dropped: 1,
@@ -505,27 +540,33 @@ mod tests {
         bytes.iter().map(|byte| format!("{byte:02x}")).collect()
     }
 
-    /// The bytes of interface version 5. If this fails, the interface has changed: raise [`INTERFACE_VERSION`], and
+    /// The bytes of interface version 6. If this fails, the interface has changed: raise [`INTERFACE_VERSION`], and
     /// only then replace the bytes.
     #[test]
     fn golden_bytes() {
         let golden = concat!(
             "ac02",                       // sequence
             "f0a204",                     // tick
-            "04",                         // mode
+            "08",                         // mode
             "01030102",                   // fault
             "01050106",                   // answer
+            "01030101",                   // notice
             "02",                         // events
             "01010102",                   // why there are no counts
             "0000a040",                   // force
             "0ad7a33b",                   // attitude stiffness
             "0000c03e",                   // integral gain
+            "0000000000000000",           // gains of the virtual frame
             "0000803e",                   // approach potential
             "0000003e",                   // attitude potential
             "0000403f",                   // integral potential
+            "0000000000000000",           // potentials of the virtual frame
+            "000000000000000000000000",   // way of what is held
+            "000000000000000000000000",   // its turn
             "000000bf",                   // work
             "0000003d",                   // damped
             "0000803d",                   // excess
+            "0000403f",                   // weight
             "a09c01",                     // cycles
             "02",                         // late ticks
             "01",                         // dropped
@@ -535,7 +576,7 @@ mod tests {
             "03000900",                   // limiting
         );
         let mut buffer = [0; Record::<3>::MOST_BYTES];
-        assert_eq!(INTERFACE_VERSION, 5);
+        assert_eq!(INTERFACE_VERSION, 6);
         assert_eq!(hex(example::<3>().encode(&mut buffer).unwrap()), golden);
         let mut buffer = [0; Record::<32>::MOST_BYTES];
         assert_eq!(hex(example::<32>().encode(&mut buffer).unwrap()), golden, "depends on the capacity");
@@ -544,22 +585,28 @@ mod tests {
     #[test]
     fn every_mode_command_refusal_and_fault_keeps_its_byte() {
         let bytes = |values: Vec<Vec<u8>>| hex(&values.concat());
-        let mut buffer = [0; 8];
+        let mut buffer = [0; 64];
         let mut modes = Vec::new();
         for mode in Mode::ALL {
             modes.push(postcard::to_slice(&mode, &mut buffer).unwrap().to_vec());
         }
-        assert_eq!(bytes(modes), "0001020304");
+        assert_eq!(bytes(modes), "000102030405060708");
         let mut commands = Vec::new();
         for command in Command::ALL {
             commands.push(postcard::to_slice(&command, &mut buffer).unwrap().to_vec());
         }
-        assert_eq!(bytes(commands), "000102000000030405");
+        assert_eq!(
+            bytes(commands),
+            "00010200000000000304050600000000000700000800000000000000000000000000000000000000000000000000000000000000000000000000090a"
+        );
         let mut refusals = Vec::new();
         for refusal in Refusal::ALL {
             refusals.push(postcard::to_slice(refusal, &mut buffer).unwrap().to_vec());
         }
-        assert_eq!(bytes(refusals), "000102030405060708090a0b0c0d0e0f101112131415161718191a1b1c1d1e1f");
+        assert_eq!(
+            bytes(refusals),
+            "000102030405060708090a0b0c0d0e0f101112131415161718191a1b1c1d1e1f202122232425262728292a"
+        );
         let mut faults = Vec::new();
         for fault in Fault::ALL {
             faults.push(postcard::to_slice(fault, &mut buffer).unwrap().to_vec());
@@ -569,7 +616,7 @@ mod tests {
         let names = Parameter::ALL
             .iter()
             .fold(0_u32, |digest, parameter| digest.rotate_left(5) ^ parameter.key().hash());
-        assert_eq!(names, 3707318196, "the numbers of parameters: another interface version");
+        assert_eq!(names, 3936813504, "the numbers of parameters: another interface version");
     }
 
     #[test]
@@ -582,7 +629,7 @@ mod tests {
             dropped: u32::MAX,
             decimation: u16::MAX,
             answer: Some(Answer {
-                command: Command::Grasp(Grasp { gains: PerGain::all(Some(0.0)) }),
+                command: Command::Move(Move { time_ms: u16::MAX, ..Move::default() }),
                 refused: Some(Refusal::Busy),
             }),
             counts: List::first_of([i32::MIN; 12], 12),
@@ -592,7 +639,7 @@ mod tests {
         };
         let mut buffer = [0; Record::<12>::MOST_BYTES];
         let length = record.encode(&mut buffer).unwrap().len();
-        // The three counts of the lists take one byte each, not two.
+        // The three counts of the lists take one byte each, not two; an answer's tag two for a time, not three.
         assert_eq!(length + 3, Record::<12>::MOST_BYTES);
         assert_eq!(record.encode(&mut [0; 100]), Err(BufferTooSmall));
     }
@@ -628,6 +675,8 @@ mod tests {
             (late, heartbeat) in any::<(bool, bool)>(),
             (cycles, late_ticks, dropped, decimation) in any::<(u32, u32, u32, u16)>(),
             answer in answers(),
+            notice in proptest::option::of((proptest::sample::select(Notice::ALL), any::<Option<u8>>())),
+            weight_n in any::<f32>(),
             gains in any::<[f32; GAIN_COUNT]>(),
             potentials_j in any::<[f32; GAIN_COUNT]>(),
             (work_j, damped_j, excess_j) in any::<(f32, f32, f32)>(),
@@ -647,6 +696,8 @@ mod tests {
                 mode,
                 fault: fault.map(|(fault, joint)| Raised { fault, joint }),
                 answer,
+                notice: notice.map(|(notice, fingertip)| Noticed { notice, fingertip }),
+                weight_n,
                 events: Events::NONE.with(Event::Late, late).with(Event::Heartbeat, heartbeat),
                 reading_failed: fault.map(|(fault, joint)| Raised { fault, joint }),
                 cycles,

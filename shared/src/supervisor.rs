@@ -2,9 +2,15 @@
 //!
 //! - **Disarmed**: no torque. The hand starts here.
 //! - **Armed**: the joints are damped and their weight is held.
-//! - **Grasping**: the grasp law. The fingertips' attitudes are latched in the first tick; the force `f_d` grows from
+//! - **Moving**: the joints follow a path to a posture, and hold it then.
+//! - **Closing**: the fingertips close until all of them touch. Where the hand's file gives no speed for that, the grasp begins at once.
+//! - **Grasping**: the laws. Everything they remember is latched in the first tick; the force `f_d` grows from
 //!   nothing over the soft start, attitudes (and joints, where the law has `u_I`) are held at full stiffness at once.
-//! - **Releasing**: force and stiffness fall in proportion to zero over the release time; then armed.
+//! - **Carrying**: the laws at their force. What is held stays where it is, or goes where it is told. Without the virtual frame there
+//!   is no such mode: the grasp stays a grasp.
+//! - **PuttingDown**: what is held sinks until it stands on something.
+//! - **Releasing**: force and stiffness fall in proportion to zero over the release time; fingertips that had closed go outwards
+//!   again. Then the hand moves to its posture `open`, or, if it has none, is armed.
 //! - **Fault**: no torque, until the fault is cleared.
 //!
 //! Where no torque is allowed there is none in the tick that enters the mode: no slew limit delays it. There the
@@ -12,23 +18,40 @@
 //! it, and while they start ([`SupervisorConfig::amplifier_start_ms`]) the modes change as ever, but torque is zero and
 //! time does not count: a `Grasp` that comes meanwhile is done, and its soft start begins when they have started.
 //!
-//! | in \ event    | Arm       | Disarm     | Grasp      | Release      | Stop     | ClearFault | *fault* | *released* |
-//! |---------------|-----------|------------|------------|--------------|----------|------------|---------|------------|
-//! | **Disarmed**  | Armed     | Disarmed   | NotArmed!  | NotGrasping! | Disarmed | NoFault!   | Fault   | Disarmed   |
-//! | **Armed**     | Armed     | Disarmed   | Grasping   | NotGrasping! | Disarmed | NoFault!   | Fault   | Armed      |
-//! | **Grasping**  | Grasping! | Grasping!  | Grasping   | Releasing    | Disarmed | NoFault!   | Fault   | Grasping   |
-//! | **Releasing** | Releasing!| Releasing! | Releasing! | Releasing    | Disarmed | NoFault!   | Fault   | Armed      |
-//! | **Fault**     | InFault!  | InFault!   | InFault!   | InFault!     | Fault    | Disarmed   | Fault   | Fault      |
+//! | in \ command    | Arm       | Disarm     | Grasp        | Release      | Stop     | ClearFault | Aim         | Posture    | Move         | PutDown      | Weigh        |
+//! |-----------------|-----------|------------|--------------|--------------|----------|------------|-------------|------------|--------------|--------------|--------------|
+//! | **Disarmed**    | Armed     | Disarmed   | NotArmed!    | NotGrasping! | Disarmed | NoFault!   | Disarmed    | NotArmed!  | NotCarrying! | NotCarrying! | NotCarrying! |
+//! | **Armed**       | Armed     | Disarmed   | Closing      | NotGrasping! | Disarmed | NoFault!   | Armed       | Moving     | NotCarrying! | NotCarrying! | NotCarrying! |
+//! | **Moving**      | Armed     | Disarmed   | Closing      | NotGrasping! | Disarmed | NoFault!   | Moving      | Moving     | NotCarrying! | NotCarrying! | NotCarrying! |
+//! | **Closing**     | Closing!  | Closing!   | Closing      | Releasing    | Disarmed | NoFault!   | Closing     | Closing!   | NotCarrying! | NotCarrying! | NotCarrying! |
+//! | **Grasping**    | Grasping! | Grasping!  | Grasping     | Releasing    | Disarmed | NoFault!   | Grasping    | Grasping!  | NotCarrying! | NotCarrying! | NotCarrying! |
+//! | **Carrying**    | Grasping! | Grasping!  | Carrying     | Releasing    | Disarmed | NoFault!   | Carrying    | Grasping!  | Carrying     | PuttingDown  | Carrying     |
+//! | **PuttingDown** | Grasping! | Grasping!  | PuttingDown! | Releasing    | Disarmed | NoFault!   | PuttingDown | Grasping!  | PuttingDown! | PuttingDown  | PuttingDown! |
+//! | **Releasing**   | Releasing!| Releasing! | Releasing!   | Releasing    | Disarmed | NoFault!   | Releasing   | Releasing! | Releasing!   | Releasing!   | Releasing!   |
+//! | **Fault**       | InFault!  | InFault!   | InFault!     | InFault!     | Fault    | Disarmed   | InFault!    | InFault!   | InFault!     | InFault!     | InFault!     |
+//!
+//! | in \ event       | *fault* | *released* | *opened*    | *touched*   | *missed*  | *firm*      | *down*      |
+//! |------------------|---------|------------|-------------|-------------|-----------|-------------|-------------|
+//! | **Disarmed**     | Fault   | Disarmed   | Disarmed    | Disarmed    | Disarmed  | Disarmed    | Disarmed    |
+//! | **Armed**        | Fault   | Armed      | Armed       | Armed       | Armed     | Armed       | Armed       |
+//! | **Moving**       | Fault   | Moving     | Moving      | Moving      | Moving    | Moving      | Moving      |
+//! | **Closing**      | Fault   | Closing    | Closing     | Grasping    | Releasing | Closing     | Closing     |
+//! | **Grasping**     | Fault   | Grasping   | Grasping    | Grasping    | Releasing | Carrying    | Grasping    |
+//! | **Carrying**     | Fault   | Carrying   | Carrying    | Carrying    | Releasing | Carrying    | Carrying    |
+//! | **PuttingDown**  | Fault   | PuttingDown| PuttingDown | PuttingDown | Releasing | PuttingDown | Carrying    |
+//! | **Releasing**    | Fault   | Armed      | Moving      | Releasing   | Releasing | Releasing   | Releasing   |
+//! | **Fault**        | Fault   | Fault      | Fault       | Fault       | Fault     | Fault       | Fault       |
 //!
 //! With `!`: refused, for this reason. A command that asks for what already is, is done and changes nothing; a grasp is
-//! not latched anew. `Stop` is done in every mode; it does not hide a fault. `ClearFault` is refused (`FaultPersists`)
-//! while the cause is there. Where the table takes a command, its tick may still object: no arming without a heartbeat.
+//! not latched anew. `Stop` is done in every mode: what was held falls. It does not hide a fault. `ClearFault` is refused
+//! (`FaultPersists`) while the cause is there. Where the table takes a command, its tick may still object: no arming without a
+//! heartbeat, no posture beyond the joints' ranges.
 //!
-//! A fault whose reaction is to let go (the loss of the link) turns a grasp into a release, and ends in the mode
-//! *fault* like any other: when the release is over, or at once where there is nothing to release. Without torque it is
+//! A fault whose reaction is to let go (the loss of the link) turns closing and what comes after it into a release, and ends in the
+//! mode *fault* like any other: when the release is over, or at once where there is nothing to release. Without torque it is
 //! no fault: then nobody needs the link.
 //!
-//! In a tick, a fault that is there comes first, then the command, then the end of a release.
+//! In a tick, a fault that is there comes first, then the command, then the end of a release, then what the fingertips tell.
 
 use crate::bytes::{BufferTooSmall, Loader, Saver, SnapshotError};
 use crate::command::{Answer, Command, Refusal};
@@ -44,8 +67,16 @@ pub enum Mode {
     Disarmed,
     /// The joints are damped and their weight is held.
     Armed,
+    /// The joints follow a path to a posture, or hold it.
+    Moving,
+    /// The fingertips close until all of them touch.
+    Closing,
     /// The grasp law is at work.
     Grasping,
+    /// What is held stays where it is, or goes where it is told.
+    Carrying,
+    /// What is held sinks until it stands on something.
+    PuttingDown,
     /// The grasp is let go.
     Releasing,
     /// No torque, because something is wrong.
@@ -54,14 +85,26 @@ pub enum Mode {
 
 impl Mode {
     /// Every mode.
-    pub const ALL: [Self; 5] = [Self::Disarmed, Self::Armed, Self::Grasping, Self::Releasing, Self::Fault];
+    pub const ALL: [Self; 9] = [
+        Self::Disarmed,
+        Self::Armed,
+        Self::Moving,
+        Self::Closing,
+        Self::Grasping,
+        Self::Carrying,
+        Self::PuttingDown,
+        Self::Releasing,
+        Self::Fault,
+    ];
 
     /// Returns `true` if the amplifiers have power in it.
     pub const fn is_powered(self) -> bool {
-        match self {
-            Self::Disarmed | Self::Fault => false,
-            Self::Armed | Self::Grasping | Self::Releasing => true,
-        }
+        !matches!(self, Self::Disarmed | Self::Fault)
+    }
+
+    /// Returns `true` if the laws of a grasp are at work in it.
+    pub const fn is_grasp(self) -> bool {
+        matches!(self, Self::Grasping | Self::Carrying | Self::PuttingDown | Self::Releasing)
     }
 
     /// Its name in words.
@@ -69,10 +112,19 @@ impl Mode {
         match self {
             Self::Disarmed => "disarmed",
             Self::Armed => "armed",
+            Self::Moving => "moving",
+            Self::Closing => "closing",
             Self::Grasping => "grasping",
+            Self::Carrying => "carrying",
+            Self::PuttingDown => "putting down",
             Self::Releasing => "releasing",
             Self::Fault => "fault",
         }
+    }
+
+    pub(crate) fn load(from: &mut Loader<'_>) -> Result<Self, SnapshotError> {
+        let mode = Self::ALL.get(usize::from(from.u8()?)).copied();
+        mode.ok_or(SnapshotError::Malformed("no mode has this number"))
     }
 }
 
@@ -83,8 +135,18 @@ pub enum Event {
     Command(Command),
     /// A fault is there.
     Fault,
-    /// The release time is over.
+    /// The release time is over, and the hand has no posture to open to.
     Released,
+    /// The release time is over, and the hand opens.
+    Opened,
+    /// All fingertips touch.
+    Touched,
+    /// There is nothing between the fingertips, or not between all of them.
+    Missed,
+    /// The force has grown to its full, and the hand can carry.
+    Firm,
+    /// What was put down stands.
+    Down,
 }
 
 /// The outcome of an event.
@@ -96,21 +158,30 @@ pub enum Outcome {
     Refuse(Refusal),
 }
 
-/// The table of the module's essay: a row a mode, a column an event.
+/// The tables of the module's essay: a row a mode, a column a command or an event.
 #[rustfmt::skip]
-const TABLE: [[Outcome; 8]; 5] = {
-    use Mode::{Armed, Disarmed, Fault, Grasping, Releasing};
-    use Outcome::{Enter, Refuse};
+const TABLE: [[Outcome; COLUMNS]; 9] = {
+    use Mode::{Armed, Carrying, Closing, Disarmed, Fault, Grasping, Moving, PuttingDown, Releasing};
+    const fn to(mode: Mode) -> Outcome { Outcome::Enter(mode) }
+    const fn no(refusal: Refusal) -> Outcome { Outcome::Refuse(refusal) }
     use Refusal as R;
+    let (held, none, fault) = (no(R::NotCarrying), no(R::NoFault), to(Fault));
+    let (grasp, sink, open, broken) = (no(R::Grasping), no(R::PuttingDown), no(R::Releasing), no(R::InFault));
     [
-        // Arm                  Disarm                Grasp                 Release                 Stop             ClearFault          fault         released
-        [Enter(Armed),         Enter(Disarmed),      Refuse(R::NotArmed),  Refuse(R::NotGrasping), Enter(Disarmed), Refuse(R::NoFault), Enter(Fault), Enter(Disarmed)],
-        [Enter(Armed),         Enter(Disarmed),      Enter(Grasping),      Refuse(R::NotGrasping), Enter(Disarmed), Refuse(R::NoFault), Enter(Fault), Enter(Armed)],
-        [Refuse(R::Grasping),  Refuse(R::Grasping),  Enter(Grasping),      Enter(Releasing),       Enter(Disarmed), Refuse(R::NoFault), Enter(Fault), Enter(Grasping)],
-        [Refuse(R::Releasing), Refuse(R::Releasing), Refuse(R::Releasing), Enter(Releasing),       Enter(Disarmed), Refuse(R::NoFault), Enter(Fault), Enter(Armed)],
-        [Refuse(R::InFault),   Refuse(R::InFault),   Refuse(R::InFault),   Refuse(R::InFault),     Enter(Fault),    Enter(Disarmed),    Enter(Fault), Enter(Fault)],
+        // Arm             Disarm           Grasp             Release             Stop          Clear           Aim              Posture           Move         PutDown          Weigh         fault  released         opened           touched          missed          firm             down
+        [to(Armed),        to(Disarmed),    no(R::NotArmed),  no(R::NotGrasping), to(Disarmed), none,           to(Disarmed),    no(R::NotArmed),  held,        held,            held,         fault, to(Disarmed),    to(Disarmed),    to(Disarmed),    to(Disarmed),   to(Disarmed),    to(Disarmed)],
+        [to(Armed),        to(Disarmed),    to(Closing),      no(R::NotGrasping), to(Disarmed), none,           to(Armed),       to(Moving),       held,        held,            held,         fault, to(Armed),       to(Armed),       to(Armed),       to(Armed),      to(Armed),       to(Armed)],
+        [to(Armed),        to(Disarmed),    to(Closing),      no(R::NotGrasping), to(Disarmed), none,           to(Moving),      to(Moving),       held,        held,            held,         fault, to(Moving),      to(Moving),      to(Moving),      to(Moving),     to(Moving),      to(Moving)],
+        [no(R::Closing),   no(R::Closing),  to(Closing),      to(Releasing),      to(Disarmed), none,           to(Closing),     no(R::Closing),   held,        held,            held,         fault, to(Closing),     to(Closing),     to(Grasping),    to(Releasing),  to(Closing),     to(Closing)],
+        [grasp,            grasp,           to(Grasping),     to(Releasing),      to(Disarmed), none,           to(Grasping),    grasp,            held,        held,            held,         fault, to(Grasping),    to(Grasping),    to(Grasping),    to(Releasing),  to(Carrying),    to(Grasping)],
+        [grasp,            grasp,           to(Carrying),     to(Releasing),      to(Disarmed), none,           to(Carrying),    grasp,            to(Carrying),to(PuttingDown), to(Carrying), fault, to(Carrying),    to(Carrying),    to(Carrying),    to(Releasing),  to(Carrying),    to(Carrying)],
+        [grasp,            grasp,           sink,             to(Releasing),      to(Disarmed), none,           to(PuttingDown), grasp,            sink,        to(PuttingDown), sink,         fault, to(PuttingDown), to(PuttingDown), to(PuttingDown), to(Releasing),  to(PuttingDown), to(Carrying)],
+        [open,             open,            open,             to(Releasing),      to(Disarmed), none,           to(Releasing),   open,             open,        open,            open,         fault, to(Armed),       to(Moving),      to(Releasing),   to(Releasing),  to(Releasing),   to(Releasing)],
+        [broken,           broken,          broken,           broken,             fault,        to(Disarmed),   broken,          broken,           broken,      broken,          broken,       fault, fault,           fault,           fault,           fault,          fault,           fault],
     ]
 };
+/// Commands and events.
+const COLUMNS: usize = 18;
 
 /// Returns the outcome of an event in a mode.
 pub fn outcome(mode: Mode, event: Event) -> Outcome {
@@ -122,9 +193,19 @@ pub fn outcome(mode: Mode, event: Event) -> Outcome {
             Command::Release => 3,
             Command::Stop => 4,
             Command::ClearFault => 5,
+            Command::Aim { .. } => 6,
+            Command::Posture { .. } => 7,
+            Command::Move(_) => 8,
+            Command::PutDown => 9,
+            Command::Weigh => 10,
         },
-        Event::Fault => 6,
-        Event::Released => 7,
+        Event::Fault => 11,
+        Event::Released => 12,
+        Event::Opened => 13,
+        Event::Touched => 14,
+        Event::Missed => 15,
+        Event::Firm => 16,
+        Event::Down => 17,
     };
     // The table covers everything; were it ever to miss something, the safe side is without torque.
     TABLE.get(mode as usize).and_then(|row| row.get(column)).copied().unwrap_or(Outcome::Enter(Mode::Fault))
@@ -154,6 +235,8 @@ impl SupervisorConfig {
             soft_start: Ramp::new(period.ticks(self.soft_start_ms, "supervisor.soft_start_ms")?),
             release: Ramp::new(period.ticks(self.release_ms, "supervisor.release_ms")?),
             amplifier_start_ticks: period.ticks(self.amplifier_start_ms, "supervisor.amplifier_start_ms")?,
+            has: Stages::NONE,
+            retreat_ticks: 0,
         })
     }
 }
@@ -164,6 +247,35 @@ pub struct Ramps {
     soft_start: Ramp,
     release: Ramp,
     amplifier_start_ticks: u32,
+    has: Stages,
+    retreat_ticks: u32,
+}
+
+/// The stages of the cycle that a hand has.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Stages {
+    /// Fingertips close before a grasp, and go outwards after it.
+    pub closing: bool,
+    /// After a release, the hand opens.
+    pub opening: bool,
+}
+
+impl Stages {
+    /// A grasp that begins at once, and ends armed.
+    pub const NONE: Self = Self { closing: false, opening: false };
+}
+
+impl Ramps {
+    /// The same for a hand that has such stages, and takes so many ticks to go outwards.
+    #[must_use]
+    pub fn with(self, has: Stages, retreat_ticks: u32) -> Self {
+        Self { has, retreat_ticks: if has.closing { retreat_ticks } else { 0 }, ..self }
+    }
+
+    /// The stages that the hand has.
+    pub fn has(&self) -> Stages {
+        self.has
+    }
 }
 
 /// A share that grows by the tick from nothing to one.
@@ -196,6 +308,10 @@ pub enum Drive {
     Off,
     /// Damping, and what holds the weight.
     Hold,
+    /// A path to a posture.
+    Path,
+    /// Fingertips that close, or go outwards.
+    Close,
     /// The grasp law.
     Grip {
         /// Share of forces: see [`Ramp`](crate::control::Ramp).
@@ -237,8 +353,7 @@ impl Supervisor {
     }
 
     pub(crate) fn load(from: &mut Loader<'_>) -> Result<Self, SnapshotError> {
-        let mode = Mode::ALL.get(usize::from(from.u8()?)).copied();
-        let mode = mode.ok_or(SnapshotError::Malformed("no mode has this number"))?;
+        let mode = Mode::load(from)?;
         let (number, has_joint, joint) = (from.u8()?, from.flag()?, from.u8()?);
         let fault = match number {
             0 => None,
@@ -283,10 +398,19 @@ impl Supervisor {
         if !was_powered && self.mode.is_powered() {
             self.starting = ramps.amplifier_start_ticks;
         }
-        if self.mode == Mode::Releasing && self.starting == 0 && self.age >= ramps.release.ticks {
-            self.take(Event::Released);
+        if !ramps.has.closing && self.mode == Mode::Closing {
+            self.take(Event::Touched);
+        }
+        let released = ramps.release.ticks.saturating_add(ramps.retreat_ticks);
+        if self.mode == Mode::Releasing && self.starting == 0 && self.age >= released {
+            self.take(if ramps.has.opening { Event::Opened } else { Event::Released });
         }
         answer
+    }
+
+    /// Takes what the tick notices by itself.
+    pub(crate) fn notice(&mut self, event: Event) {
+        self.take(event);
     }
 
     /// Does what the fault asks for; the fault that came first is kept.
@@ -295,8 +419,10 @@ impl Supervisor {
             Reaction::TorqueOff => Event::Fault,
             Reaction::Release => match self.mode {
                 Mode::Disarmed => return,
-                Mode::Armed | Mode::Fault => Event::Fault,
-                Mode::Grasping | Mode::Releasing => Event::Command(Command::Release),
+                Mode::Armed | Mode::Moving | Mode::Fault => Event::Fault,
+                Mode::Closing | Mode::Grasping | Mode::Carrying | Mode::PuttingDown | Mode::Releasing => {
+                    Event::Command(Command::Release)
+                }
             },
         };
         self.take(event);
@@ -309,6 +435,10 @@ impl Supervisor {
             Mode::Disarmed | Mode::Fault => Drive::Off,
             _ if self.starting > 0 => Drive::Off,
             Mode::Armed => Drive::Hold,
+            Mode::Moving => Drive::Path,
+            Mode::Closing => Drive::Close,
+            Mode::Carrying | Mode::PuttingDown => Drive::Grip { force_share: 1.0, stiffness_share: 1.0 },
+            Mode::Releasing if ramps.retreat_ticks > 0 && self.age >= ramps.release.ticks => Drive::Close,
             Mode::Grasping => {
                 Drive::Grip { force_share: ramps.soft_start.share(self.age), stiffness_share: 1.0 }
             }
@@ -325,9 +455,9 @@ impl Supervisor {
     /// Returns `true` if the force is on its way up or down, so that torques change with it.
     pub fn ramps(&self, ramps: &Ramps) -> bool {
         match self.mode {
-            Mode::Disarmed | Mode::Armed | Mode::Fault => false,
             Mode::Grasping => self.age < ramps.soft_start.ticks,
-            Mode::Releasing => true,
+            Mode::PuttingDown | Mode::Releasing => true,
+            _ => false,
         }
     }
 
@@ -355,14 +485,17 @@ impl Supervisor {
                 // A fault that lets go is not hidden by a Stop, nor forgotten at the end of the release.
                 let letting_go = self.mode == Mode::Releasing && self.fault.is_some();
                 let mode = if letting_go { Mode::Fault } else { mode };
-                if mode == Mode::Releasing {
-                    self.grasped = self.age.saturating_sub(1);
-                }
+                self.grasped = match self.mode {
+                    Mode::Grasping => self.age.saturating_sub(1),
+                    _ => u32::MAX,
+                };
                 if self.mode == Mode::Fault {
                     self.fault = None;
                 }
+                // Fingertips that have grasped nothing have nothing to let go.
+                let is_empty = self.mode == Mode::Closing && mode == Mode::Releasing;
                 self.mode = mode;
-                self.age = 0;
+                self.age = if is_empty { u32::MAX } else { 0 };
                 if !mode.is_powered() {
                     self.starting = 0;
                 }
@@ -388,6 +521,7 @@ mod tests {
 
     const RAISED: Raised = Raised { fault: Fault::Overspeed, joint: Some(2) };
     const GRASP: Command = Command::Grasp(Grasp::CONFIGURED);
+    const POSTURE: Command = Command::Posture { posture: None, time_ms: 0 };
 
     fn starting_ramps(soft_start_ms: u32, release_ms: u32, amplifier_start_ms: u32) -> Ramps {
         let config = SupervisorConfig { soft_start_ms, release_ms, amplifier_start_ms };
@@ -404,22 +538,31 @@ mod tests {
         let commands: &[Command] = match mode {
             Mode::Disarmed | Mode::Fault => &[],
             Mode::Armed => &[Command::Arm],
-            Mode::Grasping => &[Command::Arm, GRASP],
+            Mode::Moving => &[Command::Arm, POSTURE],
+            Mode::Closing | Mode::Grasping | Mode::Carrying | Mode::PuttingDown => &[Command::Arm, GRASP],
             Mode::Releasing => &[Command::Arm, GRASP, Command::Release],
         };
+        let ramps = &ramps.with(Stages { closing: mode == Mode::Closing, opening: false }, 0);
         for &command in commands {
             let answer = supervisor.begin(ramps, None, Some(command), None);
             assert_eq!(answer, Some(Answer { command, refused: None }));
         }
-        if mode == Mode::Fault {
-            supervisor.begin(ramps, Some(RAISED), None, None);
+        match mode {
+            Mode::Fault => assert_eq!(supervisor.begin(ramps, Some(RAISED), None, None), None),
+            Mode::Carrying | Mode::PuttingDown => supervisor.notice(Event::Firm),
+            _ => {}
+        }
+        if mode == Mode::PuttingDown {
+            supervisor.begin(ramps, None, Some(Command::PutDown), None);
         }
         assert_eq!(supervisor.mode(), mode);
         supervisor
     }
 
     fn events() -> Vec<Event> {
-        Command::ALL.map(Event::Command).into_iter().chain([Event::Fault, Event::Released]).collect()
+        let noticed =
+            [Event::Released, Event::Opened, Event::Touched, Event::Missed, Event::Firm, Event::Down];
+        Command::ALL.map(Event::Command).into_iter().chain([Event::Fault]).chain(noticed).collect()
     }
 
     #[test]
@@ -429,10 +572,13 @@ mod tests {
             .filter_map(|line| line.strip_prefix("//! | **"))
             .map(|line| line.split('|').map(|cell| cell.trim().trim_end_matches("**")).collect())
             .collect();
-        assert_eq!(table.len(), Mode::ALL.len());
-        for (mode, row) in Mode::ALL.into_iter().zip(table) {
-            assert_eq!(row[0], format!("{mode:?}"));
-            for (event, cell) in events().into_iter().zip(&row[1..]) {
+        // One of the commands, one of the events.
+        let (commands, noticed) = table.split_at(Mode::ALL.len());
+        assert_eq!(noticed.len(), Mode::ALL.len());
+        for (mode, (row, rest)) in Mode::ALL.into_iter().zip(commands.iter().zip(noticed)) {
+            assert_eq!((row[0], rest[0]), (&*format!("{mode:?}"), &*format!("{mode:?}")));
+            let cells: Vec<_> = row[1..=Command::ALL.len()].iter().chain(&rest[1..]).collect();
+            for (event, cell) in events().into_iter().zip(cells) {
                 let told = match outcome(mode, event) {
                     Outcome::Enter(mode) => format!("{mode:?}"),
                     Outcome::Refuse(refusal) => format!("{refusal:?}!"),
@@ -447,14 +593,17 @@ mod tests {
         for mode in Mode::ALL {
             for event in events() {
                 let Outcome::Enter(next) = outcome(mode, event) else { continue };
-                // Torque begins by Arm from Disarmed alone, a grasp by Grasp from Armed alone.
+                // Torque begins by Arm from Disarmed alone, a grasp by Grasp without one, or by the touch that it led to.
                 if matches!(mode, Mode::Disarmed | Mode::Fault)
                     && !matches!(next, Mode::Disarmed | Mode::Fault)
                 {
                     assert_eq!((mode, event), (Mode::Disarmed, Event::Command(Command::Arm)));
                 }
+                if next == Mode::Closing && mode != Mode::Closing {
+                    assert!(matches!(mode, Mode::Armed | Mode::Moving) && event == Event::Command(GRASP));
+                }
                 if next == Mode::Grasping && mode != Mode::Grasping {
-                    assert_eq!((mode, event), (Mode::Armed, Event::Command(GRASP)));
+                    assert_eq!((mode, event), (Mode::Closing, Event::Touched));
                 }
                 // A fault is left by ClearFault alone.
                 if mode == Mode::Fault && next != Mode::Fault {
@@ -471,13 +620,15 @@ mod tests {
 
     #[test]
     fn every_mode_and_command_does_what_the_table_says() {
-        let ramps = ramps(100, 100);
+        let ramps = ramps(100, 100).with(Stages { closing: true, opening: false }, 0);
         for mode in Mode::ALL {
             for command in Command::ALL {
                 let mut supervisor = in_mode(mode, &ramps);
                 let answer = supervisor.begin(&ramps, None, Some(command), None).unwrap();
                 assert_eq!(answer.command, command);
                 let (next, refused) = match outcome(mode, Event::Command(command)) {
+                    // Where nothing was grasped, there is nothing to let go: the release is over in its tick.
+                    Outcome::Enter(Mode::Releasing) if mode == Mode::Closing => (Mode::Armed, None),
                     Outcome::Enter(next) => (next, None),
                     Outcome::Refuse(refusal) => (mode, Some(refusal)),
                 };
@@ -561,7 +712,7 @@ mod tests {
 
     #[test]
     fn an_objection_refuses_what_the_table_would_take_and_nothing_else() {
-        let ramps = ramps(100, 100);
+        let ramps = ramps(100, 100).with(Stages { closing: true, opening: false }, 0);
         let objection = Some(Refusal::NoHeartbeat);
         for mode in Mode::ALL {
             for command in Command::ALL {

@@ -1,7 +1,7 @@
 //! The product: one function that takes the joint counts of this millisecond to the torques of the next.
 //!
 //! ```text
-//! counts --> estimate q, dq --> watch, supervise --> grasp law --> limit --> torques
+//! counts --> estimate q, dq --> watch, supervise --> cycle, laws --> limit --> torques
 //!                                       |                           |         |
 //!                                command, events                 ledger    Record --> telemetry
 //! ```
@@ -11,12 +11,14 @@
 //!
 //! Torques are those of the tick's end: what is computed from the counts of this tick acts from the next.
 
+mod stages;
 mod state;
 
 pub use state::State;
 
-use crate::command::{Command, Grasp, Refusal};
+use crate::command::{Answer, Command, Grasp, Refusal};
 use crate::control::{Account, Grip, Latch, Laws, LawsConfig, PerGain, Ramp, Stance};
+use crate::cycle::{CycleConfig, Noticed, OPEN, Postures, RETREAT_MS};
 use crate::estimate::{Estimator, EstimatorConfig, Motion};
 use crate::event::{Event, Events};
 use crate::fault::{Driven, Fault, FaultConfig, Raised, Watch};
@@ -26,7 +28,7 @@ use crate::ledger::Entry;
 use crate::limit::{LimitConfig, Limiting, Limits};
 use crate::parameter::ParameterError;
 use crate::period::Period;
-use crate::supervisor::{Drive, Mode, Ramps, SupervisorConfig};
+use crate::supervisor::{Drive, Mode, Ramps, Stages, SupervisorConfig};
 use crate::telemetry::{List, Record};
 
 /// Everything that can be set, in SI units.
@@ -46,12 +48,15 @@ pub struct Config<const J: usize> {
     pub faults: FaultConfig<J>,
     /// Times of grasping and releasing.
     pub supervisor: SupervisorConfig,
+    /// Of the stages before a grasp and after it.
+    pub cycle: CycleConfig<J>,
 }
 
 /// Everything that the tick needs and never changes: checked, and prepared once.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Params<const J: usize, const F: usize> {
     hand: Hand<f32, J, F>,
+    postures: Postures<J>,
     /// The configuration in the hand's file: how far the line may go.
     file: Config<J>,
     /// The parameters that differ from it, a bit for each.
@@ -70,12 +75,18 @@ struct Prepared<const J: usize> {
     limits: Limits<J>,
     watch: Watch<J>,
     ramps: Ramps,
+    /// Joints that move several fingertips.
+    trunk: [bool; J],
 }
 
 impl<const J: usize> Prepared<J> {
     /// Not inlined: the firmware would have it twice, at the start and where parameters are set.
     #[inline(never)]
-    fn new<const F: usize>(hand: &Hand<f32, J, F>, config: &Config<J>) -> Result<Self, ParameterError> {
+    fn new<const F: usize>(
+        hand: &Hand<f32, J, F>,
+        has_open: bool,
+        config: &Config<J>,
+    ) -> Result<Self, ParameterError> {
         let period = Period::from_us(config.period_us)?;
         let estimator = config.estimator.prepare(hand.joint_count(), period)?;
         let limits = config.limits.prepare(hand, period)?;
@@ -84,11 +95,19 @@ impl<const J: usize> Prepared<J> {
             let reason = "has to be at most its limit, the parameter `limits.` and this name";
             return Err(ParameterError { parameter: gain.key.into(), joint: None, reason });
         }
+        config.cycle.check(hand.joint_count())?;
+        let has = Stages { closing: config.cycle.closes(), opening: has_open && config.cycle.moves() };
+        let retreat_ticks = period.ticks(RETREAT_MS, "period_us")?;
+        let mut trunk = [false; J];
+        for (k, is_trunk) in trunk.iter_mut().enumerate().take(hand.joint_count()) {
+            *is_trunk = (0..hand.fingertip_count()).filter(|&i| hand.moves(k, i)).nth(1).is_some();
+        }
         Ok(Self {
             laws,
             limits,
             watch: config.faults.prepare(hand, &estimator, period)?,
-            ramps: config.supervisor.prepare(period)?,
+            ramps: config.supervisor.prepare(period)?.with(has, retreat_ticks),
+            trunk,
             period,
             period_s: period.seconds(),
             estimator,
@@ -103,7 +122,42 @@ impl<const J: usize, const F: usize> Params<J, F> {
     /// # Errors
     /// The first parameter that is wrong, with its joint and the reason.
     pub fn new(hand: Hand<f32, J, F>, config: &Config<J>) -> Result<Self, ParameterError> {
-        Ok(Self { prepared: Prepared::new(&hand, config)?, file: *config, changed: 0, hand })
+        let postures = Postures::default();
+        Ok(Self { prepared: Prepared::new(&hand, false, config)?, file: *config, changed: 0, postures, hand })
+    }
+
+    /// The same with named postures.
+    ///
+    /// # Errors
+    /// One has not an angle for each joint, or one that is beyond its range.
+    pub fn with_postures(self, postures: Postures<J>) -> Result<Self, ParameterError> {
+        let fails = |reason| Err(ParameterError { parameter: "posture".into(), joint: None, reason });
+        for posture in &postures {
+            if posture.angles_rad.len() != self.hand.joint_count() {
+                return fails("has to have an angle for each joint");
+            }
+            let mut angles = posture.angles_rad.iter().enumerate();
+            if !angles.all(|(k, &angle_rad)| self.is_within(k, angle_rad)) {
+                return fails("has to be within the joints' ranges, and off their end stops");
+            }
+        }
+        let file = self.file;
+        let mut params = Self { postures, ..self };
+        params.configure(&file)?;
+        Ok(params)
+    }
+
+    /// The named postures.
+    pub fn postures(&self) -> &Postures<J> {
+        &self.postures
+    }
+
+    /// Returns `true` if a joint may be moved to an angle, rad: within its range, and off its end stops.
+    fn is_within(&self, joint: usize, angle_rad: f32) -> bool {
+        let (lower, upper) = self.hand.range_rad(joint);
+        let margins = self.config().limits.stop_margin_rad.as_ref();
+        let margin = margins.and_then(|margins| margins.get(joint)).copied().unwrap_or(0.0);
+        angle_rad >= lower + margin && angle_rad <= upper - margin
     }
 
     /// Exchanges the configuration; a hand in motion would jump.
@@ -111,8 +165,13 @@ impl<const J: usize, const F: usize> Params<J, F> {
     /// # Errors
     /// As [`Self::new`]; nothing changes then.
     pub fn configure(&mut self, config: &Config<J>) -> Result<(), ParameterError> {
-        self.prepared = Prepared::new(&self.hand, config)?;
+        self.prepared = Prepared::new(&self.hand, self.has_open(), config)?;
         Ok(())
+    }
+
+    /// Returns `true` if there is a posture to open to.
+    fn has_open(&self) -> bool {
+        self.postures.iter().any(|posture| posture.name.as_slice() == OPEN)
     }
 
     /// The hand.
@@ -238,10 +297,8 @@ pub(crate) fn tick_into<const J: usize, const F: usize>(
     let objection = input.command.and_then(|command| object(params, state, input.events, command));
     let before = state.supervisor.mode();
     let answer = state.supervisor.begin(&params.prepared.ramps, fault, input.command, objection);
-    if let (Some(Command::Grasp(grasp)), Mode::Grasping) = (input.command, state.supervisor.mode())
-        && before != Mode::Grasping
-    {
-        state.grasp = gains(params, grasp);
+    if let Some(Answer { command, refused: None }) = answer {
+        stages::obey(params, state, before, command);
     }
     let grasped = state.latch.is_some();
     let mut action = act(params, state);
@@ -279,6 +336,7 @@ pub(crate) fn tick_into<const J: usize, const F: usize>(
         mode: state.supervisor.mode(),
         fault: state.supervisor.fault(),
         answer,
+        notice: action.noticed,
         events: input.events,
         reading_failed,
         gains: account.gains,
@@ -287,6 +345,7 @@ pub(crate) fn tick_into<const J: usize, const F: usize>(
         work_j: state.ledger.work_j(),
         damped_j: state.ledger.damped_j(),
         excess_j: state.ledger.excess_j(),
+        weight_n: state.cycle.carry.weight_n(),
         cycles: 0,
         late_ticks: state.watched.late_ticks(),
         dropped: 0,
@@ -341,16 +400,16 @@ fn watch<const J: usize, const F: usize>(
     input: &Input<'_, J>,
     sensed: Option<Raised>,
 ) -> Option<Raised> {
-    let State { watched, motion, torques_nm, supervisor, .. } = state;
+    let State { watched, motion, torques_nm, supervisor, cycle, .. } = state;
     // Each of them counts something, and is asked in every tick.
     let late = params.prepared.watch.lateness(watched, input.events.contains(Event::Late));
     let silent = params.prepared.watch.heartbeat(watched, input.events.contains(Event::Heartbeat));
     let frozen = match input.sensed {
         Sensed::Counts(_) => {
             let driven = match supervisor.mode() {
-                Mode::Disarmed | Mode::Armed | Mode::Fault => Driven::Otherwise,
-                Mode::Grasping | Mode::Releasing if supervisor.ramps(&params.prepared.ramps) => Driven::Ramp,
-                Mode::Grasping | Mode::Releasing => Driven::Steadily,
+                mode if !mode.is_grasp() => Driven::Otherwise,
+                _ if supervisor.ramps(&params.prepared.ramps) || cycle.carry.is_moving() => Driven::Ramp,
+                _ => Driven::Steadily,
             };
             params.prepared.watch.standstill(watched, motion, torques_nm, driven)
         }
@@ -388,10 +447,11 @@ fn object<const J: usize, const F: usize>(
             } else {
                 // To be told that it is done would be wrong for a grasp of other gains.
                 let other = gains != state.grasp;
-                (state.supervisor.mode() == Mode::Grasping && other).then_some(Refusal::Grasping)
+                let mode = state.supervisor.mode();
+                ((mode.is_grasp() || mode == Mode::Closing) && other).then_some(Refusal::Grasping)
             }
         }
-        _ => None,
+        _ => stages::object(params, state, command),
     }
 }
 
@@ -408,42 +468,50 @@ struct Action<const J: usize> {
     not_finite: Option<Raised>,
     /// The laws' account; `None` without torque.
     account: Option<Account<f32>>,
+    /// What was noticed.
+    noticed: Option<Noticed>,
 }
 
 impl<const J: usize> Action<J> {
     /// No torque.
     fn none() -> Self {
-        Self { torques_nm: [0.0; J], limiting: [Limiting::NONE; J], not_finite: None, account: None }
+        let limiting = [Limiting::NONE; J];
+        Self { torques_nm: [0.0; J], limiting, not_finite: None, account: None, noticed: None }
     }
 }
 
 /// The law and the limits, as the mode wants them.
 fn act<const J: usize, const F: usize>(params: &Params<J, F>, state: &mut State<J, F>) -> Action<J> {
-    let drive = state.supervisor.drive(&params.prepared.ramps);
-    if !matches!(drive, Drive::Grip { .. }) {
+    let ramps = &params.prepared.ramps;
+    if state.supervisor.drive(ramps) == Drive::Off {
         state.latch = None;
-    }
-    if drive == Drive::Off {
         return Action::none();
     }
-    let Motion { angles_rad, speeds_rad_s, .. } = &state.motion;
-    params.hand.forward_kinematics(angles_rad, &mut state.posture);
-    let stance = Stance { hand: &params.hand, posture: &state.posture, angles_rad };
+    params.hand.forward_kinematics(&state.motion.angles_rad, &mut state.posture);
+    let noticed = stages::notice(params, state);
+    let drive = state.supervisor.drive(ramps);
+    let State { motion, posture, latch, cycle, grasp, .. } = state;
+    let Motion { angles_rad, speeds_rad_s, .. } = &*motion;
     let grip = match drive {
-        Drive::Off | Drive::Hold => None,
         Drive::Grip { force_share, stiffness_share } => Some(Grip {
-            latch: &*state.latch.get_or_insert_with(|| Latch::of(stance.posture, angles_rad)),
-            gains: state.grasp.zip_with(&PerGain::RAMP, |gain, ramp| match ramp {
+            latch: &*latch.get_or_insert_with(|| Latch::of(&params.hand, posture, angles_rad)),
+            gains: grasp.zip_with(&PerGain::RAMP, |gain, ramp| match ramp {
                 Ramp::Force => gain * force_share,
                 Ramp::Stiffness => gain * stiffness_share,
             }),
         }),
+        _ => {
+            *latch = None;
+            None
+        }
     };
     let Prepared { laws, limits, watch, .. } = &params.prepared;
-    let (mut torques_nm, account) = laws.torques(&stance, speeds_rad_s, grip.as_ref());
+    let stance = Stance { hand: &params.hand, posture, angles_rad, speeds_rad_s, held: &cycle.held };
+    let (mut torques_nm, account) = laws.torques(&stance, grip.as_ref());
+    stages::torques(params, drive, motion, posture, cycle, &mut torques_nm);
     // A limit makes an infinite torque finite: both sides of it are looked at.
     let wanted = watch.torques(&torques_nm);
     let limiting = limits.apply(angles_rad, speeds_rad_s, &state.torques_nm, &mut torques_nm);
     let not_finite = wanted.or(watch.torques(&torques_nm));
-    Action { torques_nm, limiting, not_finite, account: Some(account) }
+    Action { torques_nm, limiting, not_finite, account: Some(account), noticed }
 }

@@ -3,10 +3,11 @@
 use crate::common;
 
 use blindgrasp_shared::bytes::BufferTooSmall;
+use blindgrasp_shared::cycle::{NamedPosture, POSTURES_MOST, Postures};
 use blindgrasp_shared::estimate::Encoder;
 use blindgrasp_shared::model::{ModelError, decode, encode, hash, torques_per_volt_nm_v};
 use blindgrasp_shared::tick::Config;
-use common::{JOINTS, config, hand};
+use common::{JOINTS, config, facing_rad, hand};
 use crc::{CRC_32_ISO_HDLC, Crc};
 use proptest::prelude::*;
 
@@ -15,7 +16,15 @@ const OUTPUTS: [f32; JOINTS] = [0.25, -0.25, 0.125, 1e-3, -0.1, 0.7, 3.0, -1e4, 
 
 fn bytes(config: &Config<JOINTS>) -> Vec<u8> {
     let mut buffer = [0; 4096];
-    encode(&hand::<JOINTS, 3>(), config, &OUTPUTS, &mut buffer).expect("it fits").to_vec()
+    encode(&hand::<JOINTS, 3>(), &postures(), config, &OUTPUTS, &mut buffer).expect("it fits").to_vec()
+}
+
+/// Two postures, one of them at the hand's facing angles.
+fn postures() -> Postures<JOINTS> {
+    let facing = NamedPosture::new("open", &facing_rad::<f32, JOINTS>());
+    let mut postures = [NamedPosture::default(); POSTURES_MOST];
+    (postures[0], postures[1]) = (NamedPosture::new("a-name-of-15-ch", &[0.1; JOINTS]), facing);
+    Postures::first_of(postures, 2)
 }
 
 fn checksum(bytes: &[u8]) -> u32 {
@@ -35,6 +44,8 @@ fn every_bit_comes_back() {
     assert_eq!(format!("{:?}", params.config()), format!("{config:?}"));
     assert_eq!(format!("{:?}", params.hand()), format!("{:?}", hand::<JOINTS, 3>()));
     assert_eq!(torques_per_volt_nm_v(&bytes), Ok(OUTPUTS));
+    assert_eq!(params.postures(), &postures());
+    assert_eq!(params.postures().as_slice()[0].name(), "a-name-of-15-ch");
     assert_eq!(hash(&bytes), checksum(&bytes[..bytes.len() - 4]));
 }
 
@@ -43,10 +54,10 @@ fn the_capacity_it_is_held_in_is_none_of_its_bytes() {
     let bytes = bytes(&config());
     let large = decode::<24, 5>(&bytes).expect("there is room");
     let mut buffer = [0; 4096];
-    assert_eq!(encode(large.hand(), large.config(), &OUTPUTS, &mut buffer), Ok(&bytes[..]));
+    assert_eq!(encode(large.hand(), large.postures(), large.config(), &OUTPUTS, &mut buffer), Ok(&bytes[..]));
     for short in 0..bytes.len() {
         assert_eq!(
-            encode(large.hand(), large.config(), &OUTPUTS, &mut vec![0; short]),
+            encode(large.hand(), large.postures(), large.config(), &OUTPUTS, &mut vec![0; short]),
             Err(BufferTooSmall),
             "{short}"
         );
@@ -75,7 +86,8 @@ fn damage_is_found() {
     }
     let sealed = |bytes: &[u8]| [bytes, &checksum(bytes).to_le_bytes()].concat();
     let mut buffer = [0; 4096];
-    let eleven = encode(&hand::<JOINTS, 3>(), &config(), &OUTPUTS[1..], &mut buffer).expect("it fits");
+    let eleven =
+        encode(&hand::<JOINTS, 3>(), &postures(), &config(), &OUTPUTS[1..], &mut buffer).expect("it fits");
     assert_eq!(decode::<JOINTS, 3>(eleven).unwrap_err(), ModelError::Malformed, "an output is missing");
     let longer = sealed(&[&bytes[..bytes.len() - 4], &[0]].concat());
     assert_eq!(decode::<JOINTS, 3>(&longer).unwrap_err(), ModelError::Malformed);

@@ -3,14 +3,14 @@
 use crate::common;
 
 use blindgrasp_shared::bytes::SnapshotError;
-use blindgrasp_shared::command::{Command, Grasp};
+use blindgrasp_shared::command::{Command, Grasp, Move};
 use blindgrasp_shared::event::{Event, Events};
 use blindgrasp_shared::fault::{Fault, Raised};
 use blindgrasp_shared::supervisor::Mode;
 use blindgrasp_shared::telemetry::Record;
 use blindgrasp_shared::telemetry::snapshot::BYTES_PER_JOINT;
-use blindgrasp_shared::tick::{Input, Output, Params, State, tick};
-use common::{JOINTS, config, facing_counts, params};
+use blindgrasp_shared::tick::{Config, Input, Output, Params, State, tick};
+use common::{JOINTS, apart_counts, config, cycle_config, facing_counts, params};
 use proptest::prelude::*;
 
 type HandState = State<12, 3>;
@@ -45,9 +45,11 @@ impl Step {
 }
 
 /// Ticks with everything in them: jitter, fast motion, jumps, failed readings, late ticks, pauses of the heartbeat, commands.
-fn script(seed: u64, ticks: usize) -> Vec<Step> {
+/// Those of the whole cycle are drawn only for it, from hands with room between the fingertips.
+fn script(seed: u64, ticks: usize, is_cycle: bool) -> Vec<Step> {
     let mut lcg = Lcg(seed);
-    let mut counts = facing_counts::<12>();
+    let home: [i32; 12] = if is_cycle { apart_counts() } else { facing_counts() };
+    let mut counts = home;
     let mut silent = 0_u32;
     (0..ticks)
         .map(|_| {
@@ -55,7 +57,7 @@ fn script(seed: u64, ticks: usize) -> Vec<Step> {
                 *count += lcg.below(9) as i32 - 4;
             }
             match lcg.below(150) {
-                0 => counts = facing_counts(),
+                0 => counts = home,
                 1 => counts[lcg.below(12) as usize] += 30_000,
                 2 => counts[lcg.below(12) as usize] -= 400,
                 3 => silent = 60,
@@ -73,10 +75,17 @@ fn script(seed: u64, ticks: usize) -> Vec<Step> {
                 40..42 => Some(Command::Release),
                 42 => Some(Command::Stop),
                 43 => Some(Command::Disarm),
+                44..46 if is_cycle => Some(Command::Posture { posture: None, time_ms: 100 }),
+                46 if is_cycle => Some(Command::Aim { joint: 3, angle_rad: 0.5 }),
+                47..50 if is_cycle => {
+                    Some(Command::Move(Move { turn_rad: [0.1, 0.2, -0.1], ..Move::default() }))
+                }
+                50 if is_cycle => Some(Command::Weigh),
+                51 if is_cycle => Some(Command::PutDown),
                 _ => None,
             };
             if command == Some(Command::ClearFault) {
-                counts = facing_counts();
+                counts = home;
             }
             let fault = [Fault::SampleMissing, Fault::CounterReset, Fault::LinkLost][lcg.below(3) as usize];
             Step {
@@ -91,8 +100,7 @@ fn script(seed: u64, ticks: usize) -> Vec<Step> {
         .collect()
 }
 
-fn hand() -> HandParams {
-    let mut config = config();
+fn hand(mut config: Config<12>) -> HandParams {
     config.faults.heartbeat_ms = Some(30);
     params(&config)
 }
@@ -111,10 +119,11 @@ fn saved(state: &HandState, params: &HandParams) -> Vec<u8> {
 #[test]
 fn a_loaded_state_goes_on_to_the_bit_from_every_tick() {
     const AHEAD: usize = 250;
-    let params = hand();
-    let (mut modes, mut longest, mut compared) = ([0; 5], 0, 0);
-    for seed in 0..4 {
-        let script = script(seed, 1200);
+    let (mut modes, mut longest, mut compared) = ([0; 9], 0, 0);
+    for seed in 0..8 {
+        let is_cycle = seed >= 4;
+        let params = hand(if is_cycle { cycle_config() } else { config() });
+        let script = script(seed, 1200, is_cycle);
         let mut state = HandState::new();
         let mut records = Vec::new();
         let mut snapshots = Vec::new();
@@ -178,7 +187,7 @@ fn what_is_no_snapshot_is_refused_for_its_reason() {
     };
     assert_eq!(changed(0, 11), Some(SnapshotError::OtherHand { joints: 11, fingertips: 3 }));
     assert_eq!(changed(1, 4), Some(SnapshotError::OtherHand { joints: 12, fingertips: 4 }));
-    assert_eq!(changed(6, 5), Some(SnapshotError::Malformed("no mode has this number")));
+    assert_eq!(changed(6, 9), Some(SnapshotError::Malformed("no mode has this number")));
     assert_eq!(changed(7, 99), Some(SnapshotError::Malformed("no fault has this number")));
     assert_eq!(changed(8, 2), Some(SnapshotError::Malformed("a flag is neither 0 nor 1")));
 }
@@ -199,7 +208,7 @@ proptest! {
             bytes.resize(length, 0xff);
         }
         if let Ok(mut state) = HandState::load(&params, &bytes) {
-            for step in script(1, 20) {
+            for step in script(1, 20, true) {
                 step.run(&params, &mut state);
             }
         }

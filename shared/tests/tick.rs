@@ -9,7 +9,9 @@ use blindgrasp_shared::limit::{Limit, LimitConfig};
 use blindgrasp_shared::supervisor::{Mode, SupervisorConfig};
 use blindgrasp_shared::telemetry::Record;
 use blindgrasp_shared::tick::{Config, Input, Output, Params, Sensed, State, tick};
-use common::{JOINTS, SLEW_NM_S, TORQUE_NM, config, facing_counts, facing_rad, params};
+use common::{
+    JOINTS, SLEW_NM_S, TORQUE_NM, apart_counts, config, cycle_config, facing_counts, facing_rad, params,
+};
 use proptest::prelude::*;
 
 type TestParams = Params<12, 3>;
@@ -22,17 +24,51 @@ fn missing(joint: usize) -> Input<'static, 12> {
     Input::failed(Raised::at(joint, Fault::SampleMissing), None)
 }
 
+/// Counts of a hand in a mode: one that closes has room between its fingertips.
+fn counts_in(mode: Mode) -> [i32; 12] {
+    match mode {
+        Mode::Closing | Mode::Carrying | Mode::PuttingDown => apart_counts(),
+        _ => facing_counts(),
+    }
+}
+
 /// Ticks at the facing posture with one command each, then without; returns the last.
 fn drive(params: &TestParams, state: &mut TestState, commands: &[Command], ticks: usize) -> Output<12> {
-    let counts = facing_counts();
+    drive_at(&facing_counts(), params, state, commands, ticks)
+}
+
+/// The same at other counts.
+fn drive_at(
+    counts: &[i32; 12],
+    params: &TestParams,
+    state: &mut TestState,
+    commands: &[Command],
+    ticks: usize,
+) -> Output<12> {
     for &command in commands {
-        let output = tick(params, state, &Input::counts(&counts, Some(command)));
+        let output = tick(params, state, &Input::counts(counts, Some(command)));
         assert_eq!(output.record.answer, Some(Answer { command, refused: None }));
     }
     for _ in 1..ticks {
-        tick(params, state, &Input::counts(&counts, None));
+        tick(params, state, &Input::counts(counts, None));
     }
-    tick(params, state, &Input::counts(&counts, None))
+    tick(params, state, &Input::counts(counts, None))
+}
+
+/// Parameters of a hand that comes into a mode: those of all tests, with the stage that leads there.
+fn params_for(mode: Mode) -> TestParams {
+    let (earlier, cycle) = (config(), cycle_config());
+    let mut config = earlier;
+    match mode {
+        Mode::Moving => config.cycle.moving = cycle.cycle.moving,
+        Mode::Closing => config.cycle.closing = cycle.cycle.closing,
+        Mode::Carrying | Mode::PuttingDown => {
+            (config.laws, config.limits, config.cycle.carrying) =
+                (cycle.laws, cycle.limits, cycle.cycle.carrying);
+        }
+        _ => {}
+    }
+    params(&config)
 }
 
 /// A state that was led into a mode.
@@ -41,15 +77,23 @@ fn in_mode(params: &TestParams, mode: Mode) -> TestState {
     let commands: &[Command] = match mode {
         Mode::Disarmed | Mode::Fault => &[],
         Mode::Armed => &[Command::Arm],
-        Mode::Grasping | Mode::Releasing => &[Command::Arm, GRASP],
+        Mode::Moving => &[Command::Arm, Command::Posture { posture: None, time_ms: 0 }],
+        _ => &[Command::Arm, GRASP],
     };
-    drive(params, &mut state, commands, 50);
+    drive_at(&counts_in(mode), params, &mut state, commands, 30);
     match mode {
         Mode::Releasing => {
             tick(params, &mut state, &Input::counts(&facing_counts(), Some(Command::Release)));
         }
         Mode::Fault => {
             tick(params, &mut state, &missing(0));
+        }
+        Mode::Carrying => {
+            drive_at(&counts_in(mode), params, &mut state, &[], 80);
+        }
+        Mode::PuttingDown => {
+            drive_at(&counts_in(mode), params, &mut state, &[], 80);
+            tick(params, &mut state, &Input::counts(&counts_in(mode), Some(Command::PutDown)));
         }
         _ => {}
     }
@@ -63,13 +107,13 @@ fn has_torque(output: &Output<12>) -> bool {
 
 #[test]
 fn each_mode_drives_as_it_should() {
-    let params = params(&config());
     for mode in Mode::ALL {
+        let params = params_for(mode);
         let mut state = in_mode(&params, mode);
-        let output = tick(&params, &mut state, &Input::counts(&facing_counts(), None));
+        let output = tick(&params, &mut state, &Input::counts(&counts_in(mode), None));
         let torque = !matches!(mode, Mode::Disarmed | Mode::Fault);
         assert_eq!(has_torque(&output), torque, "{mode:?}");
-        let grip = matches!(mode, Mode::Grasping | Mode::Releasing);
+        let grip = mode.is_grasp();
         assert_eq!(output.record.gains.grasp[0] > 0.0, grip, "{mode:?}");
         assert_eq!(output.record.gains.grasp[1] > 0.0, grip, "{mode:?}");
         assert_eq!(output.record.potentials_j.grasp[0] > 0.0, grip, "{mode:?}");
@@ -79,10 +123,10 @@ fn each_mode_drives_as_it_should() {
 
 #[test]
 fn stop_takes_the_torque_away_within_one_tick_in_every_mode() {
-    let params = params(&config());
     for mode in Mode::ALL {
+        let params = params_for(mode);
         let mut state = in_mode(&params, mode);
-        let output = tick(&params, &mut state, &Input::counts(&facing_counts(), Some(Command::Stop)));
+        let output = tick(&params, &mut state, &Input::counts(&counts_in(mode), Some(Command::Stop)));
         assert_eq!(output.torques_nm, [0.0; 12], "{mode:?}");
         assert_eq!(output.record.answer, Some(Answer { command: Command::Stop, refused: None }));
         let next = if mode == Mode::Fault { Mode::Fault } else { Mode::Disarmed };
@@ -92,13 +136,13 @@ fn stop_takes_the_torque_away_within_one_tick_in_every_mode() {
 
 #[test]
 fn a_fault_takes_the_torque_away_within_one_tick_in_every_mode() {
-    let params = params(&config());
     for mode in Mode::ALL {
+        let params = params_for(mode);
         let mut state = in_mode(&params, mode);
         let output = tick(&params, &mut state, &missing(5));
         assert_eq!((output.record.mode, output.torques_nm), (Mode::Fault, [0.0; 12]), "{mode:?}");
         assert!(state.latch().is_none());
-        let output = tick(&params, &mut state, &Input::counts(&facing_counts(), Some(Command::ClearFault)));
+        let output = tick(&params, &mut state, &Input::counts(&counts_in(mode), Some(Command::ClearFault)));
         assert_eq!((output.record.mode, output.torques_nm), (Mode::Disarmed, [0.0; 12]));
         assert_eq!(output.record.fault, None);
     }
@@ -752,10 +796,9 @@ fn amplifiers_have_power_and_no_torque_while_they_start() {
 
 #[test]
 fn a_supply_that_is_too_low_is_a_fault_until_it_is_not() {
-    let params = params(&config());
-    let counts = facing_counts();
     let low = Events::NONE.with(Event::SupplyLow, true);
     for mode in Mode::ALL.into_iter().filter(|&mode| mode != Mode::Fault) {
+        let (params, counts) = (params_for(mode), counts_in(mode));
         let mut state = in_mode(&params, mode);
         // It is named before what it brings with it.
         let output = tick(&params, &mut state, &missing(2).with(low));

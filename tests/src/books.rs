@@ -11,7 +11,7 @@ use blindgrasp::plant::integrator::Plant;
 use blindgrasp::sim;
 use blindgrasp::sim::sample::Sample;
 use blindgrasp_shared::command::{Command, Grasp};
-use blindgrasp_shared::control::{Grip, Latch, Stance};
+use blindgrasp_shared::control::{Grip, Held, Latch, Stance};
 use blindgrasp_shared::telemetry::Record;
 use blindgrasp_shared::tick::{Input, Params, State, tick};
 use std::f64::consts::TAU;
@@ -159,12 +159,14 @@ pub fn true_excess_j(scene: &Scene, outcome: &Outcome) -> Vec<f64> {
     let samples = &outcome.run.samples;
     let Some(first) = samples.first() else { return Vec::new() };
     let (posture, angles_rad) = place(first);
-    let latch = Latch::of(&posture, &angles_rad);
+    let latch = Latch::of(&scene.hand, &posture, &angles_rad);
     let potential_j = |sample: &Sample, turned: &Turned| {
         let (posture, angles_rad) = place(sample);
         let gains = turned.gains.map(|&gain| gain.into());
-        let stance = Stance { hand: &scene.hand, posture: &posture, angles_rad: &angles_rad };
-        let account = laws.torques(&stance, &[0.0; MAX_JOINTS], Some(&Grip { latch: &latch, gains })).1;
+        let held = Held::nothing();
+        let (hand, speeds_rad_s) = (&scene.hand, &[0.0; MAX_JOINTS]);
+        let stance = Stance { hand, posture: &posture, angles_rad: &angles_rad, speeds_rad_s, held: &held };
+        let account = laws.torques(&stance, Some(&Grip { latch: &latch, gains })).1;
         account.potentials_j.iter().sum::<f64>() - account.weight_potential_j
     };
     let mut excesses_j = vec![0.0];

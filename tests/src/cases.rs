@@ -3,7 +3,9 @@
 use crate::description::{Description, Placed};
 use crate::numeric::derivative;
 use crate::random::Draw;
-use blindgrasp_shared::control::{Account, Chosen, Grip, Hold, Latch, Laws, LawsConfig, PerGain, Stance};
+use blindgrasp_shared::control::{
+    Account, Chosen, FrameConfig, Grip, Held, Hold, Latch, Laws, LawsConfig, PerGain, Stance,
+};
 use blindgrasp_shared::hand::{Hand, Posture, Wrench};
 use nalgebra::{Matrix3, Vector3};
 
@@ -82,7 +84,7 @@ impl Case {
 
     /// Returns the laws' memory of the beginning of the grasp.
     pub fn latch(&self) -> Latch<f64, JOINTS, FINGERS> {
-        Latch::of(&self.posture(&self.latched), &self.latched)
+        Latch::of(&self.hand, &self.posture(&self.latched), &self.latched)
     }
 
     /// Returns the result of the law at some speeds, rad/s, with some gains.
@@ -97,8 +99,17 @@ impl Case {
         speeds: &Torques,
         grip: Option<&Grip<'_, f64, JOINTS, FINGERS>>,
     ) -> (Torques, Account<f64>) {
-        let stance = Stance { hand: &self.hand, posture: &self.posture(angles), angles_rad: angles };
-        self.law.torques(&stance, speeds, grip)
+        let posture = self.posture(angles);
+        let held =
+            grip.map_or_else(Held::nothing, |grip| Held::at_latch(&self.hand, &posture, &grip.latch.frame));
+        let stance = Stance {
+            hand: &self.hand,
+            posture: &posture,
+            angles_rad: angles,
+            speeds_rad_s: speeds,
+            held: &held,
+        };
+        self.law.torques(&stance, grip)
     }
 
     /// The wrenches of `u_s` at full force.
@@ -205,6 +216,7 @@ impl Case {
 /// The law with the gains above.
 pub fn law(hand: &RandomHand, k_st: f64, damping: &Torques, gravity: &Vector3<f64>) -> Laws<f64, JOINTS> {
     let config = LawsConfig {
+        frame: FrameConfig::least(),
         gains: PerGain { grasp: [FORCE_N, k_st], ..PerGain::all(0.0) },
         chosen: Chosen::ALL,
         hold: Hold { damping_nm_s: *damping, gravity_m_s2: Some(*gravity) },

@@ -12,7 +12,9 @@ use blindgrasp::body::{FaceContact, FingertipModel};
 use blindgrasp::body::{Hand, MAX_FINGERS, MAX_JOINTS, Posture};
 use blindgrasp::plant::integrator::Plant;
 use blindgrasp::plant::{Motion, ObjectModel, PlantModel};
-use blindgrasp_shared::control::{Account, Chosen, Hold, Latch, Laws, LawsConfig, PerGain, Stance};
+use blindgrasp_shared::control::{
+    self, Account, Chosen, FrameConfig, Hold, Latch, Laws, LawsConfig, PerGain, Stance,
+};
 use blindgrasp_shared::math::Real;
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 
@@ -113,6 +115,7 @@ impl Grasp {
             None => ARM_DAMPING_NM_S,
         });
         let config = LawsConfig {
+            frame: FrameConfig::least(),
             gains: PerGain { grasp: [FORCE_N, ATTITUDE_STIFFNESS_NM], ..PerGain::all(0.0) },
             chosen: Chosen::ALL,
             hold: Hold { damping_nm_s, gravity_m_s2: Some(GRAVITY_M_S2) },
@@ -142,7 +145,8 @@ impl Grasp {
             pushes: Vec::new(),
         };
         let start = Motion::at_rest(angles_rad, held.position_m, held.attitude);
-        Self { description, model, start, laws, latch: Latch::of(&posture, &angles_rad) }
+        let latch = Latch::of(&model.hand, &posture, &angles_rad);
+        Self { description, model, start, laws, latch }
     }
 
     /// The plant at the start.
@@ -156,8 +160,10 @@ impl Grasp {
     /// The law at the plant's motion.
     fn law_at(&self, plant: &Plant) -> (JointVector, Account<f64>) {
         let Motion { angles_rad, speeds_rad_s, .. } = plant.motion();
-        let stance = Stance { hand: &self.model.hand, posture: plant.posture(), angles_rad };
-        self.laws.torques(&stance, speeds_rad_s, Some(&self.laws.grip(&self.latch)))
+        let (hand, posture) = (&self.model.hand, plant.posture());
+        let held = control::Held::at_latch(hand, posture, &self.latch.frame);
+        let stance = Stance { hand, posture, angles_rad, speeds_rad_s, held: &held };
+        self.laws.torques(&stance, Some(&self.laws.grip(&self.latch)))
     }
 
     /// The law's torques for the plant's motion, N m.

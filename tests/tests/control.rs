@@ -1,7 +1,7 @@
 //! The grasp law against the paper's formulas as they are printed: Eqs. 30-34 and 59 for the torques, Eqs. 43 and 44
 //! for the potentials.
 
-use blindgrasp_shared::control::{Latch, Stance};
+use blindgrasp_shared::control::{Held, Latch, Stance};
 use blindgrasp_shared::hand::Wrench;
 use blindgrasp_tests::cases::{Case, JOINTS, K_ST_NM, RandomHand, cases, law};
 use blindgrasp_tests::numeric::Errors;
@@ -248,22 +248,24 @@ fn normal_only_knows_no_latch() {
     for mut case in cases(8000, 100) {
         let normal_only = law(&case.hand, 0.0, &case.damping, &case.gravity);
         let posture = case.posture(&case.angles);
-        let latches = [case.latch(), Latch::of(&posture, &case.angles)];
-        let stance = Stance { hand: &case.hand, posture: &posture, angles_rad: &case.angles };
+        let latches = [case.latch(), Latch::of(&case.hand, &posture, &case.angles)];
+        let (speeds, rest, held) = (case.speeds, [0.0; JOINTS], Held::nothing());
+        let (hand, angles_rad) = (&case.hand, &case.angles);
+        let stance = Stance { hand, posture: &posture, angles_rad, speeds_rad_s: &speeds, held: &held };
         let approach = case.torques(&case.speeds, (1.0, 0.0));
         for latch in &latches {
             let grip = normal_only.grip(latch);
-            let (torques, monitor) = normal_only.torques(&stance, &case.speeds, Some(&grip));
+            let (torques, monitor) = normal_only.torques(&stance, Some(&grip));
             assert_eq!(torques, approach);
             assert_eq!(monitor.potentials_j.grasp[1], 0.0);
         }
         let weight = case.hand.gravity_torques(&posture, &case.gravity);
         let pulls = case.hand.fingertip_torques(&posture, &case.approach_wrenches(&posture));
         let expected: [f64; JOINTS] = std::array::from_fn(|k| pulls[k] + weight[k]);
-        let rest = [0.0; JOINTS];
-        let still = normal_only.torques(&stance, &rest, Some(&normal_only.grip(&latches[0])));
+        let resting = Stance { speeds_rad_s: &rest, ..stance };
+        let still = normal_only.torques(&resting, Some(&normal_only.grip(&latches[0])));
         assert_eq!(still.0, expected);
-        let released = case.law.torques(&stance, &rest, None).0;
+        let released = case.law.torques(&resting, None).0;
         assert_eq!(released, weight);
         case.speeds = [0.0; JOINTS];
         assert_eq!(case.torques(&case.speeds, (0.0, 0.0)), released);

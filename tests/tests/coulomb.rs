@@ -7,7 +7,7 @@ use blindgrasp::plant::Motion;
 use blindgrasp::plant::coulomb::{self, Friction, World};
 use blindgrasp::plant::integrator::Plant;
 use blindgrasp::sim;
-use blindgrasp_shared::control::{Latch, Laws, Stance};
+use blindgrasp_shared::control::{Held, Latch, Laws, Stance};
 
 const SCENES: [&str; 3] = ["cube-ideal", "prism-ideal", "hand-arm"];
 
@@ -24,13 +24,15 @@ impl Loop {
         let scene = Scene::load(name, &[]).expect("built in");
         let plant = sim::plant(&scene).expect("it can be simulated");
         let start = *plant.motion();
-        let latch = Latch::of(plant.posture(), &start.angles_rad);
+        let latch = Latch::of(&scene.hand, plant.posture(), &start.angles_rad);
         Self { laws: sim::laws(&scene).expect("good gains"), latch, start, scene }
     }
 
     fn torques(&self, posture: &Posture, motion: &Motion) -> JointVector {
-        let stance = Stance { hand: &self.scene.hand, posture, angles_rad: &motion.angles_rad };
-        self.laws.torques(&stance, &motion.speeds_rad_s, Some(&self.laws.grip(&self.latch))).0
+        let Motion { angles_rad, speeds_rad_s, .. } = motion;
+        let held = Held::nothing();
+        let stance = Stance { hand: &self.scene.hand, posture, angles_rad, speeds_rad_s, held: &held };
+        self.laws.torques(&stance, Some(&self.laws.grip(&self.latch))).0
     }
 
     /// So much friction that nothing slips.

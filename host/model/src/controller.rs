@@ -1,8 +1,11 @@
 //! The controller's configuration, from the files: the one of a scene's closed loop, and the one of a hand's firmware.
 
 use super::file::{Actuators, Control, JointFile, Safety, Sensors};
-use blindgrasp_body::MAX_JOINTS;
-use blindgrasp_shared::control::{Hold, LawsConfig};
+use super::hand::posture;
+use blindgrasp_body::dynamics::{Body, mass_matrix, place_bodies};
+use blindgrasp_body::{Hand, MAX_JOINTS};
+use blindgrasp_shared::control::{FrameConfig, Hold, LawsConfig};
+use blindgrasp_shared::cycle::{CarryingConfig, ClosingConfig, CycleConfig, MovingConfig};
 use blindgrasp_shared::estimate::{Encoder, EstimatorConfig};
 use blindgrasp_shared::fault::FaultConfig;
 use blindgrasp_shared::joints::MotorConfig;
@@ -10,11 +13,12 @@ use blindgrasp_shared::limit::LimitConfig;
 use blindgrasp_shared::math::Real;
 use blindgrasp_shared::supervisor::SupervisorConfig;
 use blindgrasp_shared::tick::Config;
-use nalgebra::Vector3;
+use nalgebra::{DMatrix, Vector3};
 use std::f64::consts::TAU;
 
 /// The data that the configuration follows from.
 pub(super) struct Setup<'a> {
+    pub(super) hand: &'a Hand,
     pub(super) joints: &'a [JointFile],
     pub(super) control: &'a Control,
     pub(super) safety: &'a Safety,
@@ -31,6 +35,11 @@ impl Setup<'_> {
         LawsConfig {
             gains: self.control.gains.map(|&gain| T::from_f64(gain)),
             chosen: self.control.laws,
+            frame: FrameConfig {
+                damping_s: T::from_f64(self.control.frame_damping_s),
+                turn_damping_s: T::from_f64(self.control.frame_turn_damping_s),
+                reach_m: T::from_f64(self.control.frame_reach_m),
+            },
             hold: Hold {
                 damping_nm_s: self.each(|joint| self.damping_nm_s(joint)),
                 gravity_m_s2: self.control.gravity_compensation.then(gravity),
@@ -100,7 +109,59 @@ impl Setup<'_> {
                 release_ms: safety.release_ms,
                 amplifier_start_ms: control.amplifier_start_ms,
             },
+            cycle: self.cycle(),
         }
+    }
+
+    /// The stages of the cycle.
+    fn cycle(&self) -> CycleConfig<MAX_JOINTS> {
+        let control = self.control;
+        let friction_nm = self.joints.iter().map(|joint| joint.coulomb_friction_nm).fold(0.0, f64::max);
+        CycleConfig {
+            moving: MovingConfig {
+                inertia_kg_m2: self.felt_inertias_kg_m2(),
+                bandwidth_rad_s: control.moving_bandwidth_rad_s as f32,
+                speed_rad_s: control.moving_speed_rad_s as f32,
+                integral_nm: (control.moving_integral_factor * friction_nm) as f32,
+            },
+            closing: ClosingConfig {
+                speed_m_s: control.closing_speed_m_s as f32,
+                stiffness_n_m: control.closing_stiffness_n_m as f32,
+                force_n: control.closing_force_n as f32,
+                damping_n_s_m: control.closing_damping_n_s_m as f32,
+            },
+            carrying: CarryingConfig {
+                reach_m: control.carrying_reach_m as f32,
+                reach_rad: control.carrying_reach_rad as f32,
+                speed_m_s: control.carrying_speed_m_s as f32,
+                speed_rad_s: control.carrying_speed_rad_s as f32,
+                integral_n: control.carrying_integral_n as f32,
+                correction_hz: control.carrying_correction_hz as f32,
+                put_down_m_s: control.carrying_put_down_m_s as f32,
+                put_down_m: control.carrying_put_down_m as f32,
+                put_down_n: control.carrying_put_down_n as f32,
+            },
+        }
+    }
+
+    /// Inertia that each joint feels in the nominal posture with the others free, `1 / (M^-1)_kk` with the rotors in `M`, kg m^2.
+    /// Its own, `M_kk`, is several times as much, with which a joint that is moved swings.
+    fn felt_inertias_kg_m2(&self) -> [f32; MAX_JOINTS] {
+        let count = self.joints.len();
+        let nominal: Vec<f64> = self.joints.iter().map(|joint| joint.nominal_rad).collect();
+        let (mut bodies, mut mass) = ([Body::NONE; MAX_JOINTS], [[0.0; MAX_JOINTS]; MAX_JOINTS]);
+        place_bodies(self.hand, &posture(self.hand, &nominal), &mut bodies);
+        mass_matrix(self.hand, &bodies, &mut mass);
+        let full = DMatrix::from_fn(count, count, |a, b| {
+            let rotor = if a == b { self.joints[a].rotor_inertia_kg_m2 } else { 0.0 };
+            rotor + mass[a.max(b)][a.min(b)]
+        });
+        // A hand whose links have no mass has no inverse, and nothing to move.
+        let inverse = full.cholesky().map(|factor| factor.inverse());
+        std::array::from_fn(|k| match &inverse {
+            Some(inverse) if k < count => (1.0 / inverse[(k, k)]) as f32,
+            _ => 0.0,
+        })
     }
 
     /// Gain `C` of Eq. 30, with the factor, N m s/rad.

@@ -13,6 +13,7 @@ use blindgrasp_body::Capsule;
 use blindgrasp_body::FingertipModel;
 use blindgrasp_body::JointFriction;
 use blindgrasp_body::{Hand, MAX_FINGERS, MAX_JOINTS, Posture};
+use blindgrasp_shared::cycle::{NAME_BYTES, POSTURES_MOST};
 use blindgrasp_shared::{
     estimate::Encoder,
     hand::{Fingertip, Joint, Link},
@@ -27,10 +28,6 @@ const LARGEST: f64 = 1e6;
 
 /// The most capsules that a hand may have: each pair of them is looked at in each step.
 pub(crate) const MAX_CAPSULES: usize = 64;
-
-/// The most named postures that a hand may have, and characters of their names: a firmware has room for so many.
-const MAX_POSTURES: usize = 8;
-const LONGEST_POSTURE_NAME: usize = 15;
 
 /// Bounds on the radius of a capsule, m, ...
 const THINNEST_M: f64 = 1e-4;
@@ -276,17 +273,16 @@ fn is_complete(posture: &PostureFile, joint_count: usize) -> bool {
 /// Checks the named postures. A hand that is told to go to one stays clear of its soft end stops.
 fn check_postures(file: &HandFile, refused: &mut Refused) {
     let count = file.postures.len();
-    if count > MAX_POSTURES {
-        let problem = format!("the hand has {count} postures: at most {MAX_POSTURES} are supported");
+    if count > POSTURES_MOST {
+        let problem = format!("the hand has {count} postures: at most {POSTURES_MOST} are supported");
         refused.take::<()>(fail("posture", problem, "leave some out"));
         return;
     }
     for (p, posture) in file.postures.iter().enumerate() {
         let (name, key) = (&posture.name, |of: &str| item("posture", p, of));
         let is_plain = |c: char| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '-';
-        if !(1..=LONGEST_POSTURE_NAME).contains(&name.len()) || !name.chars().all(is_plain) {
-            let remedy =
-                format!("has to be 1 to {LONGEST_POSTURE_NAME} small letters (a to z), digits and hyphens");
+        if !(1..=NAME_BYTES).contains(&name.len()) || !name.chars().all(is_plain) {
+            let remedy = format!("has to be 1 to {NAME_BYTES} small letters (a to z), digits and hyphens");
             refused.take::<()>(fail(key("name"), format!("`{name}` is not a name of a posture"), remedy));
         } else if file.postures[..p].iter().any(|other| other.name == *name) {
             refused.take::<()>(fail(key("name"), format!("`{name}` is there twice"), "rename one of them"));

@@ -10,13 +10,14 @@ use super::{
     open,
 };
 use blindgrasp_body::{Hand, MAX_JOINTS};
+use blindgrasp_shared::cycle::{NamedPosture, POSTURES_MOST, Postures};
 use blindgrasp_shared::model;
 use blindgrasp_shared::tick::{Config, Params};
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 
 /// Bytes that the largest hand and its configuration take: 250 a joint are more than enough.
-const MODEL_BYTES: usize = 1000 + 250 * MAX_JOINTS;
+const MODEL_BYTES: usize = 1000 + 300 * MAX_JOINTS;
 
 /// A hand, checked, with the configuration that its file asks for: the gains of `[control]`, the numbers of `[safety]`, and all
 /// limits and faults that a real hand has. Gravity is along `-z` of the base: the palm looks up.
@@ -131,7 +132,15 @@ impl HandModel {
     pub fn bytes(&self) -> Vec<u8> {
         let mut buffer = [0; MODEL_BYTES];
         let (hand, outputs) = (self.hand.cast(), &self.torques_per_volt_nm_v);
-        model::encode(&hand, &self.config, outputs, &mut buffer).expect("the largest hand fits").to_vec()
+        let postures = self.named_postures();
+        model::encode(&hand, &postures, &self.config, outputs, &mut buffer)
+            .expect("the largest hand fits")
+            .to_vec()
+    }
+
+    /// Returns the postures as the controller has them.
+    pub fn named_postures(&self) -> Postures<MAX_JOINTS> {
+        named_postures(&self.postures)
     }
 
     pub(crate) fn build(file: &HandFile) -> Result<Self> {
@@ -150,6 +159,7 @@ impl HandModel {
             );
         };
         let setup = Setup {
+            hand: &hand,
             joints: &file.joints,
             control: gains,
             safety: &file.safety,
@@ -170,6 +180,16 @@ impl HandModel {
         let (name, postures, warnings) = (file.name.clone(), file.postures.clone(), Vec::new());
         Ok(Self { name, hand, joint_names, config, postures, torques_per_volt_nm_v, warnings })
     }
+}
+
+/// Returns the postures of a file as the controller has them.
+pub(super) fn named_postures(postures: &[PostureFile]) -> Postures<MAX_JOINTS> {
+    let mut named = [NamedPosture::default(); POSTURES_MOST];
+    for (to, from) in named.iter_mut().zip(postures) {
+        let angles_rad: Vec<f32> = from.angles_rad.iter().map(|&angle| angle as f32).collect();
+        *to = NamedPosture::new(&from.name, &angles_rad);
+    }
+    Postures::first_of(named, postures.len())
 }
 
 impl HandFile {

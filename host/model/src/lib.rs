@@ -35,6 +35,7 @@ use blindgrasp_body::polyhedron::Polyhedron;
 use blindgrasp_body::{Capsule, ContactFriction, FaceContact, FingertipModel};
 use blindgrasp_body::{Hand, MAX_JOINTS};
 use blindgrasp_shared::control::LawsConfig;
+use blindgrasp_shared::cycle::Postures;
 use blindgrasp_shared::math::Real;
 use blindgrasp_shared::tick::Config;
 use controller::Setup;
@@ -221,6 +222,11 @@ impl Scene {
         self.setup().config()
     }
 
+    /// The hand's named postures, as the controller has them.
+    pub fn named_postures(&self) -> Postures<MAX_JOINTS> {
+        hand_model::named_postures(&self.file.hand.postures)
+    }
+
     /// The control laws and their gains, in either precision.
     pub fn laws_config<T: Real>(&self) -> LawsConfig<T, MAX_JOINTS> {
         self.setup().laws()
@@ -228,6 +234,7 @@ impl Scene {
 
     fn setup(&self) -> Setup<'_> {
         Setup {
+            hand: &self.hand,
             joints: &self.file.hand.joints,
             control: &self.control,
             safety: &self.file.hand.safety,

@@ -25,12 +25,12 @@ pub struct Situation {
 impl Situation {
     /// Returns `true` if the joints may have torque: for all that is known.
     pub fn may_have_torque(self) -> bool {
-        self.is_live && matches!(self.mode, Some(Mode::Armed | Mode::Grasping | Mode::Releasing))
+        self.is_live && self.mode.is_some_and(Mode::is_powered)
     }
 
     /// Returns `true` if something may be in the hand.
     fn may_hold(self) -> bool {
-        matches!(self.mode, None | Some(Mode::Grasping | Mode::Releasing))
+        self.mode.is_none_or(Mode::is_grasp)
     }
 }
 

@@ -82,7 +82,8 @@ impl Alone {
     /// # Errors
     /// The first parameter of the scene that the controller refuses.
     pub fn new(scene: &Scene) -> Result<Self, ParameterError> {
-        let params = Params::new(scene.hand.cast(), &scene.controller_config())?;
+        let params = Params::new(scene.hand.cast(), &scene.controller_config())?
+            .with_postures(scene.named_postures())?;
         Ok(Self { params, state: State::new(), record: None })
     }
 

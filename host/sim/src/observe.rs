@@ -9,7 +9,7 @@
 use crate::sample::{ContactSample, EnergySample, Sample};
 use blindgrasp_body::{Hand, MAX_FINGERS, MAX_JOINTS};
 use blindgrasp_plant::{Motion, Plant};
-use blindgrasp_shared::control::{Latch, Laws, Stance};
+use blindgrasp_shared::control::{Held, Latch, Laws, Stance};
 use nalgebra::Vector3;
 
 /// The law as it would be with perfect sensors, in the precision of the plant: what the run is compared with.
@@ -37,16 +37,17 @@ pub struct Seen<'a> {
 impl Observer {
     /// Observes laws whose latch closes where a plant is.
     pub fn new(laws: Laws<f64, MAX_JOINTS>, start: &Plant) -> Self {
-        Self { laws, latch: Latch::of(start.posture(), &start.motion().angles_rad) }
+        Self { laws, latch: Latch::of(&start.model().hand, start.posture(), &start.motion().angles_rad) }
     }
 
     /// Energy at this instant, after the velocities were solved for. The potentials are those of the whole law, also while
-    /// its force is still growing.
+    /// its force is still growing; the virtual frame's, which has a target of its own, is left out.
     pub fn energies(&self, plant: &Plant) -> EnergySample {
         let grip = self.laws.grip(&self.latch);
         let Motion { angles_rad, speeds_rad_s, .. } = plant.motion();
-        let stance = Stance { hand: &plant.model().hand, posture: plant.posture(), angles_rad };
-        let (_, account) = self.laws.torques(&stance, speeds_rad_s, Some(&grip));
+        let (hand, posture, held) = (&plant.model().hand, plant.posture(), Held::nothing());
+        let stance = Stance { hand, posture, angles_rad, speeds_rad_s, held: &held };
+        let (_, account) = self.laws.torques(&stance, Some(&grip));
         let flows = plant.flows();
         let gains = self.laws.config().hold.damping_nm_s.iter();
         EnergySample {

@@ -19,7 +19,7 @@
 //! - `V_st` has the constant `3 N K_st` added, so that it is zero at the latch and never negative: the energy is then
 //!   bounded for every `K_st`, and the condition of Eq. 49 is a sizing rule only.
 
-use super::{Effect, Gain, Law, Ramp, Signal, Stance};
+use super::{Effect, Gain, Law, LawsConfig, Ramp, Signal, Stance};
 use crate::bytes::{BufferTooSmall, Loader, Saver, SnapshotError};
 use crate::hand::frame::{dot, product_transposed};
 use crate::hand::{Hand, Posture, Wrench};
@@ -60,7 +60,7 @@ pub const SIGNALS: [Signal; 0] = [];
 /// The attitudes of the fingertips when the grasp began, `R_fi,ini` (Eq. 59).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Latch<T, const J: usize, const F: usize> {
-    attitudes: [Matrix3<T>; F],
+    pub(crate) attitudes: [Matrix3<T>; F],
 }
 
 impl<const J: usize, const F: usize> Latch<f32, J, F> {
@@ -98,7 +98,7 @@ pub struct GraspLaw<T> {
 impl<T: Real, const J: usize, const F: usize> Law<T, J, F, 2, 0> for GraspLaw<T> {
     type Latch = Latch<T, J, F>;
 
-    fn prepare(hand: &Hand<T, J, F>) -> Self {
+    fn prepare(hand: &Hand<T, J, F>, _config: &LawsConfig<T, J>) -> Self {
         let radii = (0..hand.fingertip_count()).fold(T::zero(), |sum, i| sum + hand.radius_m(i));
         Self {
             per_radii_1_m: T::one() / radii,
@@ -106,7 +106,7 @@ impl<T: Real, const J: usize, const F: usize> Law<T, J, F, 2, 0> for GraspLaw<T>
         }
     }
 
-    fn latch(posture: &Posture<T, J, F>, _angles_rad: &[T; J]) -> Latch<T, J, F> {
+    fn latch(_hand: &Hand<T, J, F>, posture: &Posture<T, J, F>, _angles_rad: &[T; J]) -> Latch<T, J, F> {
         Latch { attitudes: posture.attitudes }
     }
 
@@ -136,7 +136,7 @@ impl<T: Real, const J: usize, const F: usize> Law<T, J, F, 2, 0> for GraspLaw<T>
             hand.push(posture, fingertip.link, centre, &wrench, torques_nm);
         }
         let approach_potential_j = squares * stiffness * T::from_f64(0.5);
-        Effect { potentials_j: [approach_potential_j, attitude_potential_j], signals: [] }
+        Effect::of_springs([approach_potential_j, attitude_potential_j])
     }
 }
 

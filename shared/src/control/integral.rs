@@ -17,7 +17,7 @@
 //!
 //! The paper names this law without printing it (Secs. 1 and 3). One gain serves all joints.
 
-use super::{Effect, Gain, Law, Ramp, Signal, Stance};
+use super::{Effect, Gain, Law, LawsConfig, Ramp, Signal, Stance};
 use crate::bytes::{BufferTooSmall, Loader, Saver, SnapshotError};
 use crate::hand::{Hand, Posture};
 use crate::math::Real;
@@ -74,11 +74,11 @@ pub struct IntegralLaw<T>(PhantomData<T>);
 impl<T: Real, const J: usize, const F: usize> Law<T, J, F, 1, 0> for IntegralLaw<T> {
     type Latch = Latch<T, J, F>;
 
-    fn prepare(_hand: &Hand<T, J, F>) -> Self {
+    fn prepare(_hand: &Hand<T, J, F>, _config: &LawsConfig<T, J>) -> Self {
         Self(PhantomData)
     }
 
-    fn latch(_posture: &Posture<T, J, F>, angles_rad: &[T; J]) -> Latch<T, J, F> {
+    fn latch(_hand: &Hand<T, J, F>, _posture: &Posture<T, J, F>, angles_rad: &[T; J]) -> Latch<T, J, F> {
         Latch { angles_rad: *angles_rad }
     }
 
@@ -96,6 +96,6 @@ impl<T: Real, const J: usize, const F: usize> Law<T, J, F, 1, 0> for IntegralLaw
             *torque -= gain_nm_rad * turned;
             squares += turned * turned;
         }
-        Effect { potentials_j: [squares * gain_nm_rad * T::from_f64(0.5)], signals: [] }
+        Effect::of_springs([squares * gain_nm_rad * T::from_f64(0.5)])
     }
 }

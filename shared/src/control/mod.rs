@@ -1,16 +1,18 @@
 //! Control laws: joint angles and speeds in, joint torques out, nothing known of the object.
 //!
 //! The torques are the sum of what [`hold`] always does, and of the laws that are chosen: [`grasp`] is the paper's,
-//! [`integral`] what an earlier one had in place of one of its terms. A law is a file, and a line in the list below.
+//! [`integral`] what an earlier one had in place of one of its terms, [`frame`] what holds and moves the hand as a whole. A law is a file, and a line in the list below.
 //! It declares its **gains**, each with the ramp that it follows and the potential that is proportional to it, and what
 //! else it tells. Limits, commands, parameters, the energy ledger, records and tables follow from that; none of them
 //! knows a law by name.
 
+pub mod frame;
 pub mod gain;
 pub mod grasp;
 pub mod hold;
 pub mod integral;
 
+pub use frame::{FrameConfig, Held, Pose};
 pub use gain::{Gain, Ramp, Signal};
 pub use hold::Hold;
 
@@ -30,10 +32,10 @@ pub trait Law<T: Real, const J: usize, const F: usize, const GAINS: usize, const
     type Latch;
 
     /// Returns the law, prepared for a hand.
-    fn prepare(hand: &Hand<T, J, F>) -> Self;
+    fn prepare(hand: &Hand<T, J, F>, config: &LawsConfig<T, J>) -> Self;
 
     /// Returns what it remembers of a hand that stands like this.
-    fn latch(posture: &Posture<T, J, F>, angles_rad: &[T; J]) -> Self::Latch;
+    fn latch(hand: &Hand<T, J, F>, posture: &Posture<T, J, F>, angles_rad: &[T; J]) -> Self::Latch;
 
     /// Adds its torques, N m, at these gains. Each is the negative gradient of the potential that is returned.
     fn torques(
@@ -54,6 +56,10 @@ pub struct Stance<'a, T, const J: usize, const F: usize> {
     pub posture: &'a Posture<T, J, F>,
     /// Joint angles that lead there, rad.
     pub angles_rad: &'a [T; J],
+    /// Joint speeds, rad/s.
+    pub speeds_rad_s: &'a [T; J],
+    /// The frame of the fingertips, and its target.
+    pub held: &'a Held<T, F>,
 }
 
 /// The result of a law beside its torques.
@@ -63,6 +69,17 @@ pub struct Effect<T, const GAINS: usize, const SIGNALS: usize> {
     pub potentials_j: [T; GAINS],
     /// Its other signals.
     pub signals: [T; SIGNALS],
+    /// Power that its damping takes, W.
+    pub damping_w: T,
+    /// By how much a target that moved has raised its potentials since the tick before, J.
+    pub fed_j: T,
+}
+
+impl<T: Real, const GAINS: usize> Effect<T, GAINS, 0> {
+    /// Returns that of springs, with these potentials, J.
+    pub fn of_springs(potentials_j: [T; GAINS]) -> Self {
+        Self { potentials_j, signals: [], damping_w: T::zero(), fed_j: T::zero() }
+    }
 }
 
 /// Writes what follows from the list of laws: the laws together, and containers of one value for each of their gains.
@@ -217,8 +234,8 @@ macro_rules! laws {
 
         impl<T: Real, const J: usize, const F: usize> Latch<T, J, F> {
             /// Returns what the laws remember of a hand that stands like this; angles in rad.
-            pub fn of(posture: &Posture<T, J, F>, angles_rad: &[T; J]) -> Self {
-                Self { $($law: $law::$Law::<T>::latch(posture, angles_rad),)* }
+            pub fn of(hand: &Hand<T, J, F>, posture: &Posture<T, J, F>, angles_rad: &[T; J]) -> Self {
+                Self { $($law: $law::$Law::<T>::latch(hand, posture, angles_rad),)* }
             }
         }
 
@@ -256,7 +273,7 @@ macro_rules! laws {
                 let gains = config.gains.zip_with(&PerGain::LAW, |gain, law| {
                     if config.chosen.has(*law) { *gain } else { T::zero() }
                 });
-                Self { config: *config, gains, $($law: $law::$Law::prepare(hand),)* }
+                Self { config: *config, gains, $($law: $law::$Law::prepare(hand, config),)* }
             }
 
             /// Adds the torques of the laws whose gains are not all zero.
@@ -273,6 +290,8 @@ macro_rules! laws {
                     let effect = self.$law.torques(stance, latch, gains, torques_nm);
                     account.potentials_j.$law = effect.potentials_j;
                     account.signals.$law = effect.signals;
+                    account.damping_w += effect.damping_w;
+                    account.fed_j += effect.fed_j;
                 })*
             }
         }
@@ -282,6 +301,7 @@ macro_rules! laws {
 laws! {
     grasp: GraspLaw, "the paper's grasp law, `u_s + u_st`";
     integral: IntegralLaw, "the earlier law's integral, `u_I`";
+    frame: FrameLaw, "the virtual frame, `u_p + u_o`, which holds and moves the hand as a whole";
 }
 
 /// The laws that may act: a bit each, in the order of the list.
@@ -317,6 +337,8 @@ pub struct LawsConfig<T, const J: usize> {
     pub gains: PerGain<T>,
     /// Laws that may act.
     pub chosen: Chosen,
+    /// Damping and reach of the virtual frame.
+    pub frame: FrameConfig<T>,
     /// The torques that act with every law and without.
     pub hold: Hold<T, J>,
 }
@@ -333,6 +355,7 @@ impl<T: Real, const J: usize> LawsConfig<T, J> {
                 return Err(ParameterError { parameter: gain.key.into(), joint: None, reason });
             }
         }
+        self.frame.check()?;
         self.hold.check(hand.joint_count())?;
         Ok(Laws::prepared(self, hand))
     }
@@ -360,6 +383,8 @@ pub struct Account<T> {
     pub weight_potential_j: T,
     /// Power that the damping takes, W.
     pub damping_w: T,
+    /// By how much targets that moved have raised the potentials since the tick before, J.
+    pub fed_j: T,
 }
 
 impl<T: Real> Account<T> {
@@ -372,6 +397,7 @@ impl<T: Real> Account<T> {
             signals: PerSignal::all(zero),
             weight_potential_j: zero,
             damping_w: zero,
+            fed_j: zero,
         }
     }
 }
@@ -392,17 +418,15 @@ impl<T: Real, const J: usize> Laws<T, J> {
         Grip { latch, gains: self.gains() }
     }
 
-    /// Returns joint torques `u` (Eq. 29), N m, and what the laws know of themselves; speeds in rad/s. Without a grip the
-    /// joints are only damped and their weight held.
+    /// Returns joint torques `u` (Eq. 29), N m, and what the laws know of themselves. Without a grip the joints are only damped and their weight held.
     pub fn torques<const F: usize>(
         &self,
         stance: &Stance<'_, T, J, F>,
-        speeds_rad_s: &[T; J],
         grip: Option<&Grip<'_, T, J, F>>,
     ) -> ([T; J], Account<T>) {
         let hold = &self.config.hold;
         let (mut torques, mut account) = ([T::zero(); J], Account::none());
-        account.damping_w = hold.damp(speeds_rad_s, &mut torques);
+        account.damping_w = hold.damp(stance.speeds_rad_s, &mut torques);
         if let Some(grip) = grip {
             self.grasp_torques(stance, grip, &mut torques, &mut account);
         }

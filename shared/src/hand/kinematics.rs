@@ -185,6 +185,34 @@ impl<T: Real, const J: usize, const F: usize> Hand<T, J, F> {
         (linear, angular)
     }
 
+    /// Velocities of the fingertips' centres, `J_i dq`, m/s: from each to the base, chain by chain, as
+    /// [`push`](Self::push) goes, whose transpose it is.
+    pub fn fingertip_velocities(&self, posture: &Posture<T, J, F>, speeds_rad_s: &[T; J]) -> [Vector3<T>; F] {
+        let mut velocities = [Vector3::zeros(); F];
+        let fingertips = self.prepared_fingertips().iter().zip(&posture.centres_m);
+        for ((fingertip, centre), velocity) in fingertips.zip(&mut velocities) {
+            let mut link = Some(fingertip.link);
+            while let Some((last, (pose, axes))) = link.and_then(|last| Some((last, posture.at(last)?))) {
+                // In the plane of the chain: the speeds, and their moment about the base's origin.
+                let (mut turning, mut x, mut y) = (T::zero(), T::zero(), T::zero());
+                for k in (pose.chain..last + 1).rev() {
+                    let (Some(pose), Some(&speed)) = (posture.joints.get(k), speeds_rad_s.get(k)) else {
+                        break;
+                    };
+                    turning += speed;
+                    x += speed * pose.origin_m.x;
+                    y += speed * pose.origin_m.y;
+                }
+                let (x_axis, y_axis) = (x_axis(axes), y_axis(axes));
+                let along_x = y - turning * dot(&y_axis, centre);
+                let along_y = turning * dot(&x_axis, centre) - x;
+                *velocity += x_axis * along_x + y_axis * along_y;
+                link = self.parent(pose.chain);
+            }
+        }
+        velocities
+    }
+
     /// Joint torques that put wrenches on the fingertips, `sum(J_i^T F_i + J_Omega i^T M_i)`, N m.
     pub fn fingertip_torques(&self, posture: &Posture<T, J, F>, wrenches: &[Wrench<T>; F]) -> [T; J] {
         let mut torques = [T::zero(); J];

@@ -14,6 +14,8 @@ mod check;
 pub(crate) mod frame;
 pub mod kinematics;
 pub mod model;
+mod turn;
 
 pub use kinematics::{LinkPose, Posture, Wrench};
 pub use model::{Bend, Fingertip, Hand, HandError, Joint, Link, PreparedJoint};
+pub use turn::Turn;

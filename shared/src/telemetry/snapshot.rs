@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 /// Bytes of a part, at most.
 pub const PART_BYTES: usize = 64;
 /// Bytes of a snapshot for each joint of the capacity that suffice for every hand with no more fingertips than joints.
-pub const BYTES_PER_JOINT: usize = 144;
+pub const BYTES_PER_JOINT: usize = 464;
 
 /// A part of a snapshot.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

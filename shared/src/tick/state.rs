@@ -2,7 +2,8 @@
 
 use super::Params;
 use crate::bytes::{BufferTooSmall, Loader, Saver, SnapshotError};
-use crate::control::{Latch, PerGain};
+use crate::control::{Held, Latch, PerGain};
+use crate::cycle::Cycle;
 use crate::estimate::{Motion, Tracks};
 use crate::fault::{Raised, Watched};
 use crate::hand::Posture;
@@ -26,6 +27,8 @@ pub struct State<const J: usize, const F: usize> {
     /// Torques of the last tick, N m.
     pub(super) torques_nm: [f32; J],
     pub(super) ledger: Ledger<J>,
+    /// The stages before the grasp and after it, and what is held.
+    pub(super) cycle: Cycle<J, F>,
 }
 
 impl<const J: usize, const F: usize> State<J, F> {
@@ -42,6 +45,7 @@ impl<const J: usize, const F: usize> State<J, F> {
             posture: Posture::at_base(),
             torques_nm: [0.0; J],
             ledger: Ledger::new(),
+            cycle: Cycle::new(),
         }
     }
 
@@ -68,6 +72,11 @@ impl<const J: usize, const F: usize> State<J, F> {
     /// The fault that the hand is in, or that lets the object go.
     pub fn fault(&self) -> Option<Raised> {
         self.supervisor.fault()
+    }
+
+    /// Returns the frame of the fingertips and its target, as the laws saw them in the last tick of a grasp.
+    pub fn held(&self) -> &Held<f32, F> {
+        &self.cycle.held
     }
 
     /// Returns the laws' memory of the beginning of the grasp, while there is one.
@@ -103,6 +112,7 @@ impl<const J: usize, const F: usize> State<J, F> {
             latch.save(joints, fingertips, &mut to)?;
         }
         self.ledger.save(joints, &mut to)?;
+        self.cycle.save(joints, fingertips, &mut to)?;
         to.finish()
     }
 
@@ -130,6 +140,7 @@ impl<const J: usize, const F: usize> State<J, F> {
             state.latch = Some(Latch::load(joints, fingertips, &mut from)?);
         }
         state.ledger = Ledger::load(joints, &mut from)?;
+        state.cycle = Cycle::load(joints, fingertips, &mut from)?;
         from.finish()?;
         Ok(state)
     }

@@ -2,7 +2,8 @@
 
 #![allow(dead_code, reason = "each test file uses its part")]
 
-use blindgrasp_shared::control::{Chosen, Hold, LawsConfig, PerGain};
+use blindgrasp_shared::control::{Chosen, FrameConfig, Hold, LawsConfig, PerGain};
+use blindgrasp_shared::cycle::{CarryingConfig, ClosingConfig, CycleConfig, MovingConfig};
 use blindgrasp_shared::estimate::{Encoder, EstimatorConfig};
 use blindgrasp_shared::fault::FaultConfig;
 use blindgrasp_shared::hand::{Fingertip, Hand, Joint, Link};
@@ -27,6 +28,9 @@ pub(crate) const SLEW_NM_S: f64 = 100.0;
 
 /// Angles with which the fingertips face each other, rad.
 pub(crate) const FACING_RAD: [f64; 4] = [0.0, -0.5, 0.9, 0.8];
+
+/// Angles with which there is room for an object between the fingertips, rad.
+const APART_RAD: [f64; 4] = [0.0, -1.0, 0.9, 0.8];
 
 fn vector(x: f64, y: f64, z: f64) -> Vector3<f32> {
     Vector3::new(x, y, z).map(|entry: f64| entry as f32)
@@ -84,6 +88,7 @@ pub(crate) fn config<const J: usize>() -> Config<J> {
         laws: LawsConfig {
             gains: PerGain { grasp: [5.0, 5e-3], ..PerGain::all(0.0) },
             chosen: Chosen::ALL,
+            frame: FrameConfig::least(),
             hold: Hold { damping_nm_s, gravity_m_s2: Some(vector(0.0, 0.0, -9.81)) },
         },
         limits: LimitConfig {
@@ -107,6 +112,44 @@ pub(crate) fn config<const J: usize>() -> Config<J> {
             energy_j: Some(1.0),
         },
         supervisor: SupervisorConfig { soft_start_ms: 100, release_ms: 100, ..SupervisorConfig::LEAST },
+        cycle: CycleConfig::LEAST,
+    }
+}
+
+/// The same with all stages of the cycle.
+pub(crate) fn cycle_config<const J: usize>() -> Config<J> {
+    let earlier = config::<J>();
+    Config {
+        laws: LawsConfig {
+            gains: PerGain { frame: [300.0, 0.3], ..earlier.laws.gains },
+            frame: FrameConfig { damping_s: 0.027, turn_damping_s: 0.01, reach_m: 0.015 },
+            ..earlier.laws
+        },
+        limits: LimitConfig {
+            gains: PerGain { frame: [Some(1000.0), Some(1.0)], ..earlier.limits.gains },
+            ..earlier.limits
+        },
+        cycle: CycleConfig {
+            moving: MovingConfig {
+                inertia_kg_m2: [1e-4; J],
+                bandwidth_rad_s: 25.0,
+                speed_rad_s: 2.0,
+                integral_nm: 0.01,
+            },
+            closing: ClosingConfig { speed_m_s: 0.05, stiffness_n_m: 60.0, force_n: 0.2, damping_n_s_m: 2.5 },
+            carrying: CarryingConfig {
+                reach_m: 0.05,
+                reach_rad: 0.8,
+                speed_m_s: 0.1,
+                speed_rad_s: 1.0,
+                integral_n: 4.0,
+                correction_hz: 1.0,
+                put_down_m_s: 0.01,
+                put_down_m: 0.01,
+                put_down_n: 0.5,
+            },
+        },
+        ..earlier
     }
 }
 
@@ -122,6 +165,15 @@ pub(crate) fn facing_rad<T: Real, const J: usize>() -> [T; J] {
         *angle = T::from_f64(FACING_RAD[k % 4]);
     }
     angles
+}
+
+/// Counts of all joints with room for an object between the fingertips.
+pub(crate) fn apart_counts<const J: usize>() -> [i32; J] {
+    let mut counts = [0; J];
+    for (k, count) in counts.iter_mut().enumerate().take(JOINTS) {
+        *count = (APART_RAD[k % 4] * COUNTS_PER_RAD).round() as i32;
+    }
+    counts
 }
 
 /// Counts of all joints with the fingertips facing each other.

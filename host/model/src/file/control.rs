@@ -87,6 +87,44 @@ control! {
     estimator_bandwidth_hz: f64 = 50.0;
     /// `true`: soft end stops keep the joints within their limits.
     end_stops: bool = true;
+    /// Damping of the fingertips' common place over its stiffness `frame_stiffness_n_m`, s.
+    frame_damping_s: f64 = 0.027;
+    /// Damping of the fingertips' common attitude over its stiffness `frame_turn_stiffness_nm`, s.
+    frame_turn_damping_s: f64 = 0.01;
+    /// Distance of the fingertips' common place from its target beyond which the pull no longer grows, m.
+    frame_reach_m: f64 = 0.015;
+    /// Bandwidth of joints that follow a path to a posture, rad/s.
+    moving_bandwidth_rad_s: f64 = 25.0;
+    /// Largest speed of a joint on its path, rad/s; 0: the hand can't move to postures.
+    moving_speed_rad_s: f64 = 1.5;
+    /// Torque against friction that holds a joint in its posture, at most, as a factor on the largest Coulomb friction of a joint.
+    moving_integral_factor: f64 = 2.0;
+    /// Speed of fingertips that close, m/s; 0: a grasp begins at once, from touch.
+    closing_speed_m_s: f64 = 0.0;
+    /// Stiffness with which a fingertip that closes follows its way, N/m.
+    closing_stiffness_n_m: f64 = 60.0;
+    /// Force at which that is cut, N: that of a touch.
+    closing_force_n: f64 = 0.2;
+    /// Damping of a fingertip that closes, N s/m.
+    closing_damping_n_s_m: f64 = 2.5;
+    /// Longest way of what is held from where the grasp began, m.
+    carrying_reach_m: f64 = 0.05;
+    /// Largest turn of what is held since the grasp began, rad.
+    carrying_reach_rad: f64 = 0.8;
+    /// Largest speed of what is held, m/s.
+    carrying_speed_m_s: f64 = 0.1;
+    /// Largest angular speed of what is held, rad/s.
+    carrying_speed_rad_s: f64 = 1.0;
+    /// Most force of the integral that keeps what is held in its place, N.
+    carrying_integral_n: f64 = 4.0;
+    /// Rate at which the target follows what rolling fingertips tell of the object's turn, Hz; 0 leaves it alone.
+    carrying_correction_hz: f64 = 1.0;
+    /// Speed at which something is put down, m/s.
+    carrying_put_down_m_s: f64 = 0.01;
+    /// Depth below where the grasp began to which something is put down, m.
+    carrying_put_down_m: f64 = 0.01;
+    /// Force on what is below at which something is put down, N.
+    carrying_put_down_n: f64 = 0.5;
 }
 
 /// Every key, for suggestions.

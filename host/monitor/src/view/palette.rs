@@ -52,8 +52,10 @@ impl Palette {
         let style = match mode {
             Mode::Disarmed => Style::new(),
             Mode::Armed => self.warning(),
-            Mode::Grasping => self.good(),
-            Mode::Releasing => self.coloured(Color::Cyan, Modifier::empty()),
+            Mode::Grasping | Mode::Carrying => self.good(),
+            Mode::Moving | Mode::Closing | Mode::PuttingDown | Mode::Releasing => {
+                self.coloured(Color::Cyan, Modifier::empty())
+            }
             Mode::Fault => self.bad(),
         };
         style.add_modifier(Modifier::REVERSED | Modifier::BOLD)

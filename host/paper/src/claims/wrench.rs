@@ -34,7 +34,7 @@ pub(super) fn balanced_row(done: &Done) -> Row {
         return row(done, "no sample".to_owned(), Verdict::NotReproduced);
     };
     let hand = &scene.hand;
-    let latch = Latch::of(&first.posture(hand), &first.joint_angles_rad());
+    let latch = Latch::of(hand, &first.posture(hand), &first.joint_angles_rad());
     let fingers = hand.fingertip_count();
     let shared: Vec<usize> = (0..hand.joint_count())
         .filter(|&k| (0..fingers).filter(|&i| hand.moves(k, i)).count() == fingers)

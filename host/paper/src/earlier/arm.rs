@@ -5,7 +5,7 @@ use crate::laws::{Law, Lost, built};
 use blindgrasp_body::MAX_JOINTS;
 use blindgrasp_model::Scene;
 use blindgrasp_model::file::PushFile;
-use blindgrasp_shared::control::{Latch, Stance};
+use blindgrasp_shared::control::{Held, Latch, Stance};
 use blindgrasp_sim::laws;
 use blindgrasp_sim::sample::Sample;
 use rayon::prelude::*;
@@ -79,12 +79,14 @@ impl Carried {
 fn torques(scene: &Scene, samples: &[Sample]) -> Result<Vec<[f64; MAX_JOINTS]>, EvidenceError> {
     let laws = laws(scene).map_err(|cause| EvidenceError::of(RUN, cause))?;
     let Some(first) = samples.first() else { return Ok(Vec::new()) };
-    let latch = Latch::of(&first.posture(&scene.hand), &first.joint_angles_rad());
+    let latch = Latch::of(&scene.hand, &first.posture(&scene.hand), &first.joint_angles_rad());
     let still = [0.0; MAX_JOINTS];
     let of = |sample: &Sample| {
         let (posture, angles_rad) = (sample.posture(&scene.hand), sample.joint_angles_rad());
-        let stance = Stance { hand: &scene.hand, posture: &posture, angles_rad: &angles_rad };
-        let all = |grip| laws.torques(&stance, &still, grip).0;
+        let (hand, held) = (&scene.hand, Held::nothing());
+        let stance =
+            Stance { hand, posture: &posture, angles_rad: &angles_rad, speeds_rad_s: &still, held: &held };
+        let all = |grip| laws.torques(&stance, grip).0;
         let (with, without) = (all(Some(&laws.grip(&latch))), all(None));
         std::array::from_fn(|k| with[k] - without[k])
     };

@@ -167,6 +167,7 @@ impl Row {
             Value::Fault(fault) => told.push(Value::Fault(fault)),
             Value::Joint(joint) => told.push(Value::Joint(joint)),
             Value::Answer(answer) => told.push(Value::Answer(answer)),
+            Value::Notice(noticed) => told.push(Value::Notice(noticed)),
             Value::Limiting(limiting) => told.push(Value::Limiting(limiting)),
         });
         Self { decoded, start_ns, told }
@@ -178,9 +179,11 @@ fn kind_of(kind: signals::Kind) -> Kind {
         signals::Kind::Whole | signals::Kind::Count | signals::Kind::Fault => Kind::Whole,
         signals::Kind::Real => Kind::Real,
         signals::Kind::Truth => Kind::Truth,
-        signals::Kind::Mode | signals::Kind::Joint | signals::Kind::Answer | signals::Kind::Limiting => {
-            Kind::Words
-        }
+        signals::Kind::Mode
+        | signals::Kind::Joint
+        | signals::Kind::Answer
+        | signals::Kind::Notice
+        | signals::Kind::Limiting => Kind::Words,
     }
 }
 
@@ -205,6 +208,7 @@ fn cell<'a>(value: Value<'_>, joint_names: &'a [String]) -> Cell<'a> {
             joint_names.get(usize::from(joint)).map_or(Cell::Missing, |name| Cell::Word(name))
         }
         Value::Answer(answer) => Cell::Text(answer.to_string()),
+        Value::Notice(noticed) => Cell::Text(noticed.to_string()),
         Value::Limiting(limiting) => Cell::Word(&LIMITED_BY[usize::from(limiting.bits() & 15)]),
     }
 }

@@ -178,6 +178,7 @@ fn write_value(buffer: &mut Vec<u8>, number: u32, value: Value<'_>, joint_names:
             }
         }
         Value::Answer(answer) => text(buffer, number, &answer.to_string()),
+        Value::Notice(noticed) => text(buffer, number, &noticed.to_string()),
         Value::Limiting(limiting) => text(buffer, number, &limiting.to_string()),
     }
 }

@@ -54,7 +54,7 @@ impl FieldKind {
             Self::Told(Kind::Count) => Type::Sint32,
             Self::Told(Kind::Truth) | Self::Limit(_) => Type::Bool,
             Self::Told(Kind::Mode | Kind::Fault) => Type::Enum,
-            Self::Told(Kind::Joint | Kind::Answer | Kind::Limiting) => Type::String,
+            Self::Told(Kind::Joint | Kind::Answer | Kind::Notice | Kind::Limiting) => Type::String,
         }
     }
 }

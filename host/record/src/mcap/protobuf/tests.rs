@@ -360,7 +360,7 @@ fn the_schema_of_a_hand_has_its_joints_and_every_signal() {
                 FieldKind::Told(Kind::Truth) => "bool",
                 FieldKind::Told(Kind::Mode) => "Enum .blindgrasp.my_hand.Tick.Mode",
                 FieldKind::Told(Kind::Fault) => "Enum .blindgrasp.my_hand.Tick.Fault",
-                FieldKind::Told(Kind::Joint | Kind::Answer | Kind::Limiting) => "string",
+                FieldKind::Told(Kind::Joint | Kind::Answer | Kind::Notice | Kind::Limiting) => "string",
             };
             expect(&format!("{kind} {} = {}", signal.name, signal.number));
         }

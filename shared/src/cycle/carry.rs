@@ -1,0 +1,381 @@
+//! What is held: where it is, as the fingertips tell, and where it is to be.
+//!
+//! - **Fast**: the [virtual frame](crate::control::frame) of the fingertips' centres follows the target.
+//! - **Slow**: fingertips roll, so that the object turns by more than the frame of centres. Points fixed in the fingertips where they
+//!   touched (towards the centroid, at the latch) tell the object's pose, to a degree or so. They would make the fast loop unstable;
+//!   a slow one turns the target until the *object* has turned by what was asked for.
+//! - **Weight**: a bounded integral of the way that is left shifts the target until the frame is where it is to be.
+//! - **Weighing**: the target goes slowly up and down again; the mean of the force on both ways is the weight, as what the joints'
+//!   friction takes has the opposite sign on the other way.
+//! - **Putting down**: the target sinks until the frame presses on something below, or to a stated depth below the latch's height.
+//!   Then the target is where the frame is.
+
+use super::path::Path;
+use crate::bytes::{BufferTooSmall, Loader, Saver, SnapshotError};
+use crate::control::frame::{self, Frame};
+use crate::control::{Held, Latch, Pose};
+use crate::hand::frame::{dot, product_transposed, turn_vector};
+use crate::hand::{Hand, Posture, Turn};
+use crate::math::{Real, norm};
+use crate::parameter::ParameterError;
+use crate::period::Period;
+use nalgebra::Vector3;
+
+/// Numbers of carrying, as a user gives them.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct CarryingConfig {
+    /// Longest way from where the grasp began, m.
+    pub reach_m: f32,
+    /// Largest turn from the attitude in which it began, rad.
+    pub reach_rad: f32,
+    /// Largest speed of the target, m/s.
+    pub speed_m_s: f32,
+    /// Largest angular speed of the target, rad/s.
+    pub speed_rad_s: f32,
+    /// Most force that the integral may add, N.
+    pub integral_n: f32,
+    /// Rate at which the target follows what the fingertips tell of the object's turn, Hz; 0 leaves it alone.
+    pub correction_hz: f32,
+    /// Speed at which an object is put down, m/s.
+    pub put_down_m_s: f32,
+    /// Depth below where the grasp began to which it is put down, m.
+    pub put_down_m: f32,
+    /// Force on what is below that is enough, N.
+    pub put_down_n: f32,
+}
+
+impl CarryingConfig {
+    /// Nothing is carried anywhere.
+    pub const LEAST: Self = Self {
+        reach_m: 0.0,
+        reach_rad: 0.0,
+        speed_m_s: 0.0,
+        speed_rad_s: 0.0,
+        integral_n: 0.0,
+        correction_hz: 0.0,
+        put_down_m_s: 0.0,
+        put_down_m: 0.0,
+        put_down_n: 0.0,
+    };
+
+    pub(super) fn check(&self) -> Result<(), ParameterError> {
+        let values = [
+            ("carrying.reach_m", self.reach_m),
+            ("carrying.reach_rad", self.reach_rad),
+            ("carrying.speed_m_s", self.speed_m_s),
+            ("carrying.speed_rad_s", self.speed_rad_s),
+            ("carrying.integral_n", self.integral_n),
+            ("carrying.correction_hz", self.correction_hz),
+            ("carrying.put_down_m_s", self.put_down_m_s),
+            ("carrying.put_down_m", self.put_down_m),
+            ("carrying.put_down_n", self.put_down_n),
+        ];
+        match values.into_iter().find(|(_, value)| !(*value >= 0.0 && value.is_finite())) {
+            Some((parameter, _)) => {
+                let reason = "has to be zero or positive";
+                Err(ParameterError { parameter: parameter.into(), joint: None, reason })
+            }
+            None => Ok(()),
+        }
+    }
+}
+
+/// Rate at which the integral takes away the way that is left, 1/s.
+const INTEGRAL_1_S: f32 = 2.0;
+/// Most by which the target's attitude is corrected, rad.
+const CORRECTION_MOST_RAD: f32 = 0.35;
+/// Height of the stroke of weighing, m, and its time, ms: half of it up, half down.
+const STROKE_M: f32 = 6e-3;
+const STROKE_MS: u32 = 2000;
+/// Time before the stroke and after it in which the frame comes to rest, ms.
+const SETTLE_MS: u32 = 300;
+/// By how much the fingertips' mean distance from their centroid may shrink while they hold something, m.
+const SHRINK_M: f32 = 8e-3;
+
+/// The work that is under way.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Work {
+    /// The target is followed.
+    Follow,
+    /// The object is weighed.
+    Weigh,
+    /// The object is put down.
+    PutDown,
+}
+
+/// The result of a tick of carrying.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum Carried {
+    /// It goes on.
+    On,
+    /// The way to the target is over.
+    Arrived,
+    /// The object was weighed.
+    Weighed,
+    /// The object stands on something.
+    OnGround,
+    /// It was put down as far as is stated.
+    Deep,
+}
+
+/// The memory of what is carried.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Carry<const F: usize> {
+    /// Rotations of the fingertips' frame and of the object, as they were seen last.
+    turn: Turn<f32>,
+    object_turn: Turn<f32>,
+    /// From each fingertip's centre to where it touched, at the latch, m; and these points.
+    touches_m: [Vector3<f32>; F],
+    points: frame::Latch<f32, 0, F>,
+    /// Sum of the squares of the fingertips' distances below which nothing is between them, m^2.
+    least_m2: f32,
+    /// Way, rotation vector, and the point that is turned about, from the latch's centroid.
+    path: Path<9>,
+    integral_m: Vector3<f32>,
+    correction_rad: Vector3<f32>,
+    target: Pose<f32>,
+    work: Work,
+    age: u32,
+    /// Sum of what was measured, and its number.
+    sum_n: f32,
+    count: u32,
+    /// Depth to which the target has sunk, m.
+    sunk_m: f32,
+    /// The last weight, N.
+    weight_n: f32,
+}
+
+impl<const F: usize> Carry<F> {
+    pub(crate) fn new() -> Self {
+        let none = Turn::none();
+        Self {
+            turn: none,
+            object_turn: none,
+            touches_m: [Vector3::zeros(); F],
+            points: frame::Latch::of_points(&[Vector3::zeros(); F], F),
+            least_m2: 0.0,
+            path: Path::resting([0.0; 9]),
+            integral_m: Vector3::zeros(),
+            correction_rad: Vector3::zeros(),
+            target: Pose::latched(),
+            work: Work::Follow,
+            age: 0,
+            sum_n: 0.0,
+            count: 0,
+            sunk_m: 0.0,
+            weight_n: 0.0,
+        }
+    }
+
+    /// Begins with a grasp.
+    pub(crate) fn begin<const J: usize>(
+        &mut self,
+        hand: &Hand<f32, J, F>,
+        posture: &Posture<f32, J, F>,
+        latch: &Latch<f32, J, F>,
+    ) {
+        *self = Self { weight_n: self.weight_n, ..Self::new() };
+        let mut points_m = posture.centres_m;
+        let mut squares = 0.0;
+        for (i, fingertip) in hand.prepared_fingertips().iter().enumerate() {
+            let arm = latch.frame.arms_m[i];
+            let length = norm(&arm);
+            squares += length * length;
+            if length > 0.0 {
+                self.touches_m[i] = arm * (-fingertip.radius_m / length);
+            }
+            points_m[i] += self.touches_m[i];
+        }
+        let count = hand.fingertip_count();
+        self.points = frame::Latch::of_points(&points_m, count);
+        let mean = (squares / count as f32).square_root() - SHRINK_M;
+        self.least_m2 = if mean > 0.0 { mean * mean * count as f32 } else { 0.0 };
+    }
+
+    /// The weight that was weighed last, N.
+    pub(crate) fn weight_n(&self) -> f32 {
+        self.weight_n
+    }
+
+    /// Returns `true` while the object is weighed.
+    pub(crate) fn is_weighing(&self) -> bool {
+        self.work == Work::Weigh
+    }
+
+    /// Returns `true` while the target is on its way.
+    pub(crate) fn is_moving(&self) -> bool {
+        !self.path.is_over() || self.work != Work::Follow
+    }
+
+    /// Returns the longest ways to a target, m and rad.
+    pub(crate) fn ways(&self, to: &[f32; 9]) -> (f32, f32) {
+        (self.path.longest(to, 0..3), self.path.longest(to, 3..6))
+    }
+
+    /// Goes to a target from now on.
+    pub(crate) fn turn_to(&mut self, to: &[f32; 9], ticks: u32) {
+        self.path.turn_to(to, ticks);
+    }
+
+    /// Begins to weigh.
+    pub(crate) fn weigh(&mut self) {
+        (self.work, self.age, self.sum_n, self.count) = (Work::Weigh, 0, 0.0, 0);
+    }
+
+    /// Begins to put down.
+    pub(crate) fn put_down(&mut self) {
+        self.path = Path::resting(self.path.place().value);
+        (self.work, self.age, self.sunk_m) = (Work::PutDown, 0, 0.0);
+    }
+
+    /// Looks where the fingertips are, and says where they are to be.
+    #[inline(never)]
+    pub(crate) fn advance<const J: usize>(
+        &mut self,
+        config: &CarryingConfig,
+        period: Period,
+        stance: (&Hand<f32, J, F>, &Posture<f32, J, F>),
+        latch: &Latch<f32, J, F>,
+        stiffness_n_m: f32,
+        up: Option<Vector3<f32>>,
+        held: &mut Held<f32, F>,
+    ) -> Carried {
+        let (hand, posture) = stance;
+        let frame = Frame::seen(hand, &posture.centres_m, &latch.frame, &self.turn);
+        self.turn = frame.pose.turn;
+        let mut points_m = posture.centres_m;
+        for (i, point) in points_m.iter_mut().enumerate().take(hand.fingertip_count()) {
+            let turned = product_transposed(&posture.attitudes[i], &latch.grasp.attitudes[i]);
+            *point += turn_vector(&turned, &self.touches_m[i]);
+        }
+        let object = Frame::seen(hand, &points_m, &self.points, &self.object_turn).pose;
+        self.object_turn = object.turn;
+        let place = self.path.place();
+        let [px, py, pz, rx, ry, rz, bx, by, bz] = place.value;
+        let (way, about) = (Vector3::new(px, py, pz), Vector3::new(bx, by, bz));
+        let goal = Turn::by(&Vector3::new(rx, ry, rz));
+        let mut way_m = way + about - goal.turn(&about);
+        let period_s = period.seconds();
+        let was_over = self.path.is_over();
+        self.path.advance();
+        let mut carried = if !was_over && self.path.is_over() { Carried::Arrived } else { Carried::On };
+        let upwards = up.unwrap_or(Vector3::zeros());
+        way_m -= upwards * self.sunk_m;
+        if self.work == Work::Follow {
+            let most = if stiffness_n_m > 0.0 { config.integral_n / stiffness_n_m } else { 0.0 };
+            self.integral_m += (way_m - frame.pose.way_m) * (INTEGRAL_1_S * period_s);
+            let length = norm(&self.integral_m);
+            if length > most {
+                self.integral_m *= if length > 0.0 { most / length } else { 0.0 };
+            }
+            let left = object.turn.inverse().then(&goal).shorter().v * 2.0;
+            let rate = config.correction_hz * (core::f32::consts::TAU * period_s);
+            let most = CORRECTION_MOST_RAD;
+            self.correction_rad = (self.correction_rad + left * rate).map(|v| v.limited(-most, most));
+        }
+        way_m += self.integral_m;
+        let ticks = |time_ms: u32| (time_ms * 1000 / period.microseconds()).max(1);
+        let pull_n = |way_m: &Vector3<f32>| stiffness_n_m * dot(&(way_m - frame.pose.way_m), &upwards);
+        self.age = self.age.saturating_add(1);
+        match self.work {
+            Work::Follow => {}
+            Work::Weigh => {
+                let (settle, stroke) = (ticks(SETTLE_MS), ticks(STROKE_MS));
+                let at = self.age.saturating_sub(settle);
+                let (_, cosine) =
+                    (core::f32::consts::TAU * (at.min(stroke) as f32 / stroke as f32)).sine_cosine();
+                way_m += upwards * (STROKE_M * 0.5 * (1.0 - cosine));
+                // The middle half of the way up, and of that down.
+                let eighth = at * 8 / stroke;
+                if matches!(eighth, 1 | 2 | 5 | 6) {
+                    self.sum_n += pull_n(&way_m);
+                    self.count += 1;
+                }
+                if at >= stroke + settle {
+                    self.weight_n = self.sum_n / self.count.max(1) as f32;
+                    self.work = Work::Follow;
+                    carried = Carried::Weighed;
+                }
+            }
+            Work::PutDown => {
+                self.sunk_m += config.put_down_m_s * period_s;
+                let is_on_ground = pull_n(&(way_m - self.integral_m)) < -config.put_down_n;
+                let is_deep = dot(&way_m, &upwards) < -config.put_down_m;
+                if is_on_ground || is_deep {
+                    // From here on, the target is where the frame is.
+                    let at = way + frame.pose.way_m - (way + about - goal.turn(&about));
+                    self.path = Path::resting([at.x, at.y, at.z, rx, ry, rz, bx, by, bz]);
+                    (self.integral_m, self.sunk_m) = (Vector3::zeros(), 0.0);
+                    way_m = frame.pose.way_m;
+                    self.work = Work::Follow;
+                    carried = if is_on_ground { Carried::OnGround } else { Carried::Deep };
+                }
+            }
+        }
+        let target_before = self.target;
+        self.target = Pose { way_m, turn: goal.then(&Turn::by(&self.correction_rad)) };
+        *held = Held { frame, object, target: self.target, target_before };
+        carried
+    }
+
+    /// Returns `true` if there is nothing between the fingertips any more.
+    pub(crate) fn is_lost<const J: usize>(
+        &self,
+        hand: &Hand<f32, J, F>,
+        posture: &Posture<f32, J, F>,
+    ) -> bool {
+        let count = hand.fingertip_count();
+        let (mut sum, mut squares) = (Vector3::zeros(), 0.0);
+        for centre in posture.centres_m.iter().take(count) {
+            sum += centre;
+            squares += dot(centre, centre);
+        }
+        squares - dot(&sum, &sum) / (count as f32) < self.least_m2 || super::closing::are_close(hand, posture)
+    }
+
+    pub(crate) fn save(&self, fingertips: usize, to: &mut Saver<'_>) -> Result<(), BufferTooSmall> {
+        for turn in [&self.turn, &self.object_turn, &self.target.turn] {
+            to.f32(turn.w)?;
+            to.f32s(turn.v.as_slice(), 3)?;
+        }
+        for vectors in [&self.touches_m, &self.points.arms_m] {
+            vectors.iter().take(fingertips).try_for_each(|vector| to.f32s(vector.as_slice(), 3))?;
+        }
+        for vector in [&self.points.centroid_m, &self.integral_m, &self.correction_rad, &self.target.way_m] {
+            to.f32s(vector.as_slice(), 3)?;
+        }
+        self.path.save(9, to)?;
+        to.u8(self.work as u8)?;
+        [self.age, self.count].into_iter().try_for_each(|number| to.u32(number))?;
+        [self.least_m2, self.sum_n, self.sunk_m, self.weight_n]
+            .into_iter()
+            .try_for_each(|number| to.f32(number))
+    }
+
+    pub(crate) fn load(fingertips: usize, from: &mut Loader<'_>) -> Result<Self, SnapshotError> {
+        let mut carry = Self::new();
+        for turn in [&mut carry.turn, &mut carry.object_turn, &mut carry.target.turn] {
+            turn.w = from.f32()?;
+            from.f32s(turn.v.as_mut_slice(), 3)?;
+        }
+        for vectors in [&mut carry.touches_m, &mut carry.points.arms_m] {
+            vectors.iter_mut().take(fingertips).try_for_each(|vector| from.f32s(vector.as_mut_slice(), 3))?;
+        }
+        let Self { points, integral_m, correction_rad, target, .. } = &mut carry;
+        for vector in [&mut points.centroid_m, integral_m, correction_rad, &mut target.way_m] {
+            from.f32s(vector.as_mut_slice(), 3)?;
+        }
+        carry.path = Path::load(9, from)?;
+        carry.work = match from.u8()? {
+            0 => Work::Follow,
+            1 => Work::Weigh,
+            2 => Work::PutDown,
+            _ => return Err(SnapshotError::Malformed("no work has this number")),
+        };
+        (carry.age, carry.count) = (from.u32()?, from.u32()?);
+        for number in [&mut carry.least_m2, &mut carry.sum_n, &mut carry.sunk_m, &mut carry.weight_n] {
+            *number = from.f32()?;
+        }
+        Ok(carry)
+    }
+}
