@@ -100,8 +100,7 @@ impl Case {
         grip: Option<&Grip<'_, f64, JOINTS, FINGERS>>,
     ) -> (Torques, Account<f64>) {
         let posture = self.posture(angles);
-        let held =
-            grip.map_or_else(Held::nothing, |grip| Held::at_latch(&self.hand, &posture, &grip.latch.frame));
+        let held = Held::nothing();
         let stance = Stance {
             hand: &self.hand,
             posture: &posture,

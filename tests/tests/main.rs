@@ -28,3 +28,4 @@ mod tables;
 mod telemetry;
 mod two_fingers;
 mod urdf;
+mod virtual_frame;

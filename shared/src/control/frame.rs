@@ -323,6 +323,24 @@ impl<T: Real, const J: usize, const F: usize> Law<T, J, F, 2, 6> for FrameLaw<T>
         gains: &[T; 2],
         torques_nm: &mut [T; J],
     ) -> Effect<T, 2, 6> {
+        let &Stance { hand, posture, .. } = stance;
+        let (forces_n, effect) = self.forces_n(stance, gains);
+        let fingertips = hand.prepared_fingertips().iter().zip(&posture.centres_m);
+        for ((fingertip, centre), force_n) in fingertips.zip(forces_n) {
+            let wrench = Wrench { force_n, moment_nm: Vector3::zeros() };
+            hand.push(posture, fingertip.link, centre, &wrench, torques_nm);
+        }
+        effect
+    }
+}
+
+impl<T: Real> FrameLaw<T> {
+    /// Returns the forces at the fingertips' centres, N, and what the law knows of itself.
+    pub fn forces_n<const J: usize, const F: usize>(
+        &self,
+        stance: &Stance<'_, T, J, F>,
+        gains: &[T; 2],
+    ) -> ([Vector3<T>; F], Effect<T, 2, 6>) {
         let &Stance { hand, posture, speeds_rad_s, held, .. } = stance;
         let frame = &held.frame;
         let count = self.fingertip_count;
@@ -337,18 +355,14 @@ impl<T: Real, const J: usize, const F: usize> Law<T, J, F, 2, 6> for FrameLaw<T>
         let damping = [gains[0] * self.config.damping_s, gains[1] * self.config.turn_damping_s];
         let damping_w = dot(&velocity, &velocity) * damping[0] + dot(&turning, &turning) * damping[1];
         let forces_n = frame.spread_out(&(pull_n - velocity * damping[0]), &(turn_nm - turning * damping[1]));
-        let fingertips = hand.prepared_fingertips().iter().zip(&posture.centres_m);
-        for ((fingertip, centre), force_n) in fingertips.zip(forces_n) {
-            let wrench = Wrench { force_n, moment_nm: Vector3::zeros() };
-            hand.push(posture, fingertip.link, centre, &wrench, torques_nm);
-        }
         let Pose { way_m, turn } = held.object;
-        Effect {
+        let effect = Effect {
             potentials_j,
             signals: [way_m.x, way_m.y, way_m.z, turn.v.x, turn.v.y, turn.v.z],
             damping_w,
             fed_j: potentials_j[0] - before_j[0] + potentials_j[1] - before_j[1],
-        }
+        };
+        (forces_n, effect)
     }
 }
 
