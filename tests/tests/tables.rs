@@ -1,9 +1,13 @@
 //! Scenes with weight, friction and tables: what they are there to show, and their energy.
 
+use blindgrasp::body::MAX_JOINTS;
 use blindgrasp::model::Scene;
+use blindgrasp::sim::csv;
 use blindgrasp::sim::sample::Sample;
 use blindgrasp::sim::verdict::Outcome;
 use blindgrasp::sim::{Run, Simulation};
+use blindgrasp_shared::command::Command;
+use blindgrasp_tests::supervised::{self, Course, push_nm, scene};
 use std::f64::consts::FRAC_1_SQRT_2;
 
 fn run(name: &str, settings: &[&str]) -> (Scene, Run) {
@@ -124,6 +128,81 @@ fn a_grasp_that_is_too_weak_is_told() {
     assert_eq!(left.summary.outcome, Outcome::Dropped);
     assert!(!left.summary.grasp_held);
     assert!(left.summary.lost_at_s.is_some_and(|t_s| t_s > 1.0 && t_s < 3.0), "{:?}", left.summary.lost_at_s);
+}
+
+/// An open hand over what lies on a table: until a fingertip touches it, the table carries all of it and nothing else presses; whatever
+/// the law alone then does with it, which knows no way to close gently, every number of every sample is one.
+///
+/// Tolerances: 1e-3 of the weight; the ledger's, as above, with a fifth of the step: joints hit each other at 20 rad/s.
+#[test]
+fn an_open_hand_closes_on_what_it_has_not_touched() {
+    for (name, posture) in
+        [("pick-cube", "open"), ("pick-cube", "preshape"), ("pick-prism", "open"), ("pick-prism", "preshape")]
+    {
+        let (scene, run) =
+            run(name, &[&format!("start.posture={posture}"), "duration_s=1.0", "plant.substep_s=1e-4"]);
+        let presses = |sample: &Sample| sample.contacts.iter().any(|contact| contact.normal_force_n > 0.0);
+        let touch = run.samples.iter().position(presses).expect("it is touched");
+        let before = &run.samples[..touch];
+        println!(
+            "{name}, {posture}: touched at {:.3} s, {:?} at {:.3} s, ledger off by {:.1e}",
+            run.samples[touch].t_s,
+            run.summary.outcome,
+            run.summary.duration_s,
+            off(&run)
+        );
+        assert!(touch > 20 && before.iter().all(|sample| sample.contacts.len() == 3));
+        assert!(before.iter().flat_map(|sample| &sample.contacts).all(|contact| {
+            contact.indentation_m < 0.0 && contact.friction.is_some_and(|friction| friction.slipped_m == 0.0)
+        }));
+        let carried_n = before[touch - 1].table_force_n();
+        assert!((-carried_n.z / (scene.mass_kg * 9.81) - 1.0).abs() < 1e-3, "{carried_n}");
+        assert!(off(&run) < 1e-3);
+        let mut trace = Vec::new();
+        csv::write(&mut trace, &run.samples).expect("in memory");
+        let trace = String::from_utf8(trace).expect("text");
+        let mut rows = trace.lines().skip(1).map(|row| row.rsplit_once(',').expect("a mode").0);
+        assert!(rows.all(|row| row.split(',').all(|cell| cell.parse::<f64>().is_ok_and(f64::is_finite))));
+    }
+    let (_, waits) = run("pick-cube", &["duration_s=0.02"]);
+    assert_eq!((waits.summary.outcome, waits.summary.grasp_held), (Outcome::NeverGrasped, false));
+}
+
+/// Picked up from a table and put down on it: the table goes away and comes back under what is held, and the hand lets go and opens,
+/// for which somebody leans on its fingers. The same without the way back, or let go before it, drops the object.
+#[test]
+fn what_is_put_down_is_not_dropped() {
+    let opened = |name: &str, moves: &str, let_go_tick: u64| {
+        let moves = format!("plant.table.1.move=[{moves}]");
+        let scene = scene(
+            name,
+            &[&moves, "plant.shake=[]", &format!("duration_s={:?}", let_go_tick as f64 * 1e-3 + 0.8)],
+        );
+        let push_nm = (0..3).map(|finger| {
+            let out = scene.start.attitude * scene.contacts[finger].frame.column(1) * -0.2;
+            push_nm(&scene, finger, out)
+        });
+        let push_nm =
+            push_nm.fold([0.0; MAX_JOINTS], |sum, push_nm| std::array::from_fn(|k| sum[k] + push_nm[k]));
+        let course = Course {
+            commands: vec![(let_go_tick, Command::Release)],
+            pushes: vec![(let_go_tick + 300..let_go_tick + 340, push_nm)],
+            ..Course::default()
+        };
+        let Run { samples, summary, .. } = supervised::run(&scene, &course).run;
+        let pressing = |sample: &Sample| sample.contacts.iter().any(|contact| contact.normal_force_n > 0.0);
+        assert!(!samples.last().is_some_and(pressing), "the hand is open");
+        println!("{name}, let go at {let_go_tick} ms: {:?} at {:.3} s", summary.outcome, summary.duration_s);
+        (summary.outcome, summary.grasp_held)
+    };
+    let away = "{from_s=0.5,for_s=0.5,by_m=[0.0,0.0,0.1]}";
+    let and_back = format!("{away},{{from_s=1.5,for_s=0.5,by_m=[0.0,0.0,-0.0998]}}");
+    for name in ["cube-table", "prism-table"] {
+        assert_eq!(opened(name, "", 1500), (Outcome::PutDown, true));
+        assert_eq!(opened(name, &and_back, 2500), (Outcome::PutDown, true));
+        assert_eq!(opened(name, &and_back, 1000), (Outcome::Dropped, false));
+        assert_eq!(opened(name, away, 2500), (Outcome::Dropped, false));
+    }
 }
 
 /// Closed at once, fingertips bounce off the object and come back: that has lost nothing. Without friction the object slips out at

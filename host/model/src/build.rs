@@ -40,14 +40,6 @@ pub(super) fn scene(file: SceneFile) -> Result<Scene> {
     all_within("pose.position_m", &file.pose.position_m, 100.0)?;
     let position_m = Vector3::from(file.pose.position_m);
 
-    let count = file.hand.fingertips.len();
-    if file.contacts.len() != count {
-        return fail(
-            "contact",
-            format!("{} contacts for {count} fingertips", file.contacts.len()),
-            "give one [[contact]] for each fingertip, in the hand's order",
-        );
-    }
     let Parts { hand, object, .. } = &parts;
     let (contacts, start) = start(&file, hand, &object.shape, position_m, attitude)?;
     if let Some(&k) = still_joints(hand, &start.angles_rad).first() {
@@ -57,6 +49,7 @@ pub(super) fn scene(file: SceneFile) -> Result<Scene> {
     world::at_start(&file, &parts, &start)?;
     let Parts { hand, capsules, object, substeps, mut warnings } = parts;
     world::sinking(&file.plant, object.mass_kg, &mut warnings);
+    world::falling(&file, &object.shape, &start, &mut warnings);
     overlaps(&file.hand, &hand, &start.angles_rad, &mut warnings);
 
     Ok(Scene {

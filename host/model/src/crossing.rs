@@ -31,6 +31,8 @@ pub(super) struct Posed<'a> {
     pub(super) hand: &'a Hand,
     pub(super) capsules: &'a [Capsule],
     pub(super) posture: &'a Posture,
+    /// The hand touches the object where the scene's contacts are.
+    pub(super) touches: bool,
 }
 
 impl Posed<'_> {
@@ -43,6 +45,9 @@ impl Posed<'_> {
             let [a, b] = parts.map(|part| self.file.part_in_words(part));
             let problem = format!("{a} and {b} overlap by {:.3} mm at the start", overlap_m * 1e3);
             return match parts {
+                [Part::Fingertip(_), Part::Fingertip(_)] if !self.touches => {
+                    fail("start", problem, "open the hand wider")
+                }
                 [Part::Fingertip(_), Part::Fingertip(second)] => {
                     fail(item("contact", second, "point_m"), problem, "move the contacts apart")
                 }

@@ -50,8 +50,9 @@ keys! {
         pub object: ObjectFile,
         /// Position and attitude of the object at the start.
         pub pose: PoseFile,
-        /// The points at which fingertips touch the object: one `[[contact]]` for each fingertip, in the hand's order.
-        #[serde(rename = "contact")]
+        /// The points at which fingertips touch the object: one `[[contact]]` for each fingertip, in the hand's order. None where the
+        /// hand begins open, without touch: with `start.posture` or `start.angles_rad`, and `plant.contact = "coulomb"`.
+        #[serde(rename = "contact", default, skip_serializing_if = "Vec::is_empty")]
         pub contacts: Vec<ContactFile>,
         /// Posture and indentation at the start.
         #[serde(default)]
@@ -118,6 +119,9 @@ keys! {
         /// left out stay at their nominal angles.
         #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
         pub trunk_rad: BTreeMap<String, f64>,
+        /// Name of a posture of the hand's file, for the angles of all joints.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        pub posture: Option<String>,
         /// Angles of all joints, rad, in the hand's order. They replace the inverse kinematics: contact points and indentations
         /// follow.
         #[serde(default, skip_serializing_if = "Option::is_none")]

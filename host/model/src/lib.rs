@@ -94,7 +94,7 @@ pub struct Scene {
     pub mass_kg: f64,
     /// Its inertia about its centre of mass in the object frame, kg m^2. Not diagonal in general.
     pub inertia_kg_m2: Matrix3<f64>,
-    /// The face that each fingertip touches, in the hand's order.
+    /// The face that each fingertip touches, in the hand's order; none where the hand begins open.
     pub contacts: Vec<FaceContact>,
     /// The posture and the places at the start; all speeds are zero.
     pub start: Start,
@@ -174,9 +174,9 @@ pub struct Start {
     pub position_m: Vector3<f64>,
     /// Attitude `R` of the object.
     pub attitude: UnitQuaternion<f64>,
-    /// Indentation `dr_i` of each fingertip, m.
+    /// Indentation `dr_i` of each fingertip, m; none where the hand begins open.
     pub indentations_m: Vec<f64>,
-    /// Contact point of each fingertip in the object frame, m.
+    /// Contact point of each fingertip in the object frame, m; none where the hand begins open.
     pub points_m: Vec<Vector3<f64>>,
 }
 

@@ -439,15 +439,18 @@ fn wxyz(turn: &UnitQuaternion<f64>) -> [f64; 4] {
     [turn.w, turn.i, turn.j, turn.k]
 }
 
-/// Depths at which the fingertips settle, m.
+/// Depths at which the fingertips settle, m; some depth where it is not known which faces they will touch.
 fn settled_m(scene: &Scene) -> Vec<f64> {
     let inwards: Vec<Vector3<f64>> =
         scene.contacts.iter().map(|contact| contact.frame.column(1).into_owned()).collect();
     let (radii, stiffnesses): (Vec<f64>, Vec<f64>) =
         scene.fingertips.iter().map(|tip| (tip.radius_m, tip.stiffness_n_m2)).unzip();
     let force_n = scene.control.force_n();
-    equilibrium_indentations(&scene.start.points_m, &inwards, &radii, &stiffnesses, force_n)
-        .unwrap_or_else(|_| radii.iter().map(|radius_m| SOME_DEPTH * radius_m).collect())
+    let settled = equilibrium_indentations(&scene.start.points_m, &inwards, &radii, &stiffnesses, force_n);
+    settled
+        .ok()
+        .filter(|depths_m| depths_m.len() == radii.len())
+        .unwrap_or_else(|| radii.iter().map(|radius_m| SOME_DEPTH * radius_m).collect())
 }
 
 /// Step, s: the longest that divides the plant's and resolves the object between its fingertips.

@@ -7,7 +7,7 @@ use super::{
     file::{Indentation, JointFile, PoseFile, SceneFile},
     hand::{posture, rotation},
 };
-use blindgrasp_body::polyhedron::Polyhedron;
+use blindgrasp_body::polyhedron::{Polyhedron, Touchable};
 use blindgrasp_body::{FaceContact, Hand, equilibrium_indentations, inverse_kinematics};
 use nalgebra::{Matrix3, Quaternion, UnitQuaternion, Vector3};
 
@@ -54,6 +54,34 @@ fn contact_frame(outward_normal: &Vector3<f64>) -> Matrix3<f64> {
 }
 
 impl SceneFile {
+    /// The angles of all joints at the start, rad, if the scene gives them, and the key that does.
+    ///
+    /// # Errors
+    /// A posture that the hand does not have, or angles that its joints can't have.
+    fn given_rad(&self, hand: &Hand) -> Result<Option<(&'static str, &[f64])>> {
+        match (&self.start.posture, &self.start.angles_rad) {
+            (Some(_), Some(_)) => fail(
+                "start.posture",
+                "angles are given as well",
+                "leave start.posture or start.angles_rad out",
+            ),
+            (Some(name), None) => {
+                let postures = &self.hand.postures;
+                let Some(posture) = postures.iter().find(|posture| posture.name == *name) else {
+                    let known = postures.iter().map(|posture| posture.name.as_str());
+                    let problem = format!("the hand `{}` has no posture `{name}`", self.hand.name);
+                    return fail("start.posture", problem, suggestion(name, known));
+                };
+                Ok(Some(("start.posture", &posture.angles_rad)))
+            }
+            (None, Some(angles_rad)) => {
+                check_angles(self, hand, angles_rad)?;
+                Ok(Some(("start.angles_rad", angles_rad)))
+            }
+            (None, None) => Ok(None),
+        }
+    }
+
     /// The angles that the inverse kinematics starts from and stays near, rad; those of joints that move several fingertips
     /// it keeps.
     ///
@@ -97,15 +125,31 @@ pub(super) fn start(
     attitude: UnitQuaternion<f64>,
 ) -> Result<(Vec<FaceContact>, Start)> {
     let nominal_rad = file.nominal_rad(hand)?;
+    let given_rad = file.given_rad(hand)?;
+    let (tips, given) = (file.hand.fingertips.len(), file.contacts.len());
+    match given_rad {
+        Some((key, angles)) if given == 0 => {
+            return open(file, hand, shape, key, Start::apart(angles, position_m, attitude));
+        }
+        _ if given == tips => {}
+        _ => {
+            let remedy = "give one [[contact]] for each fingertip, in the hand's order";
+            let or = if given == 0 { "; or none, and start.posture: then the hand begins open" } else { "" };
+            return fail(
+                "contact",
+                format!("{given} contacts for {tips} fingertips"),
+                format!("{remedy}{or}"),
+            );
+        }
+    }
     let mut contacts = touches(file, shape)?;
     let radii: Vec<f64> = file.hand.fingertips.iter().map(|fingertip| fingertip.radius_m).collect();
 
-    if let Some(angles) = &file.start.angles_rad {
-        check_angles(file, hand, angles)?;
+    if let Some((_, angles)) = given_rad {
         let indentations_m = touch(file, hand, shape, &mut contacts, angles, &position_m, &attitude)?;
         unobstructed(file, shape, &contacts, &indentations_m)?;
         let points_m = contacts.iter().map(|touch| touch.point_m).collect();
-        let start = Start { angles_rad: angles.clone(), position_m, attitude, indentations_m, points_m };
+        let start = Start { angles_rad: angles.to_vec(), position_m, attitude, indentations_m, points_m };
         return Ok((contacts.iter().map(|touch| touch.on).collect(), start));
     }
 
@@ -161,6 +205,41 @@ pub(super) fn start(
     })?;
     let start = Start { angles_rad, position_m, attitude, indentations_m, points_m: points };
     Ok((contacts.iter().map(|touch| touch.on).collect(), start))
+}
+
+impl Start {
+    /// A hand that touches nothing.
+    fn apart(angles_rad: &[f64], position_m: Vector3<f64>, attitude: UnitQuaternion<f64>) -> Self {
+        let (indentations_m, points_m) = (Vec::new(), Vec::new());
+        Self { angles_rad: angles_rad.to_vec(), position_m, attitude, indentations_m, points_m }
+    }
+}
+
+/// Checks that a hand that begins open touches nothing with its fingertips. `key` is that of its posture.
+fn open(
+    file: &SceneFile,
+    hand: &Hand,
+    shape: &Polyhedron,
+    key: &str,
+    start: Start,
+) -> Result<(Vec<FaceContact>, Start)> {
+    if !file.plant.has_friction() {
+        let problem =
+            "fingertips that roll touch the object from the start on, and no [[contact]] says where";
+        return fail(key, problem, "a hand that begins open needs plant.contact = \"coulomb\"");
+    }
+    let (object, posture) = (Touchable::of(shape), posture(hand, &start.angles_rad));
+    for (i, fingertip) in file.hand.fingertips.iter().enumerate() {
+        let centre_m = start.attitude.inverse() * (posture.centres_m[i] - start.position_m);
+        let depth_m = hand.radius_m(i) - object.closest(&centre_m).distance_m;
+        if depth_m > 0.0 {
+            let name = &fingertip.name;
+            let problem =
+                format!("fingertip `{name}` is {:.3} mm inside the object at the start", depth_m * 1e3);
+            return fail(key, problem, "open the hand wider, or move the object (pose.position_m)");
+        }
+    }
+    Ok((Vec::new(), start))
 }
 
 /// A face and the point of it that a fingertip touches, in the object frame, m.

@@ -1,8 +1,9 @@
 //! The checks of a scene's world: contact, friction, tables, gravity that turns.
 
 use super::check::{Result, all_within, fail, item, within};
-use super::file::{PlantSettings, SceneFile};
+use super::file::{PlantSettings, SceneFile, TableFile};
 use super::{Parts, Scene, Start, crossing, hand::posture};
+use blindgrasp_body::polyhedron::Polyhedron;
 use blindgrasp_body::{CORNER_STIFFNESS_N_M, ContactFriction};
 use nalgebra::Vector3;
 
@@ -127,12 +128,11 @@ pub(super) fn at_start(file: &SceneFile, parts: &Parts, start: &Start) -> Result
     }
     let posture = &posture(&parts.hand, &start.angles_rad);
     let capsules = if file.plant.links_touch() { &parts.capsules[..] } else { &[] };
-    let posed = crossing::Posed { file: &file.hand, hand: &parts.hand, capsules, posture };
+    let touches = !file.contacts.is_empty();
+    let posed = crossing::Posed { file: &file.hand, hand: &parts.hand, capsules, posture, touches };
     posed.are_above(&file.plant.tables)?;
     for (t, table) in file.plant.tables.iter().enumerate() {
-        let corners = shape.vertices_m.iter().map(|corner_m| start.position_m + start.attitude * corner_m);
-        let lowest_m =
-            corners.map(|corner_m| crossing::height_m(table, &corner_m)).fold(f64::INFINITY, f64::min);
+        let lowest_m = lowest_m(table, shape, start);
         if lowest_m < -SUNK_M {
             let problem = format!("the object is {:.3} mm inside the table", -lowest_m * 1e3);
             return fail(item("plant.table", t, "point_m"), problem, "move the table or the object's pose");
@@ -140,6 +140,20 @@ pub(super) fn at_start(file: &SceneFile, parts: &Parts, start: &Start) -> Result
     }
     posed.are_apart()?;
     posed.are_outside(shape, start)
+}
+
+/// Height of the object's lowest corner above a table at the start, m.
+fn lowest_m(table: &TableFile, shape: &Polyhedron, start: &Start) -> f64 {
+    let corners = shape.vertices_m.iter().map(|corner_m| start.position_m + start.attitude * corner_m);
+    corners.map(|corner_m| crossing::height_m(table, &corner_m)).fold(f64::INFINITY, f64::min)
+}
+
+/// Tells an object that neither a hand nor a table holds at the start.
+pub(super) fn falling(file: &SceneFile, shape: &Polyhedron, start: &Start, warnings: &mut Vec<String>) {
+    let lies = |table: &TableFile| lowest_m(table, shape, start) < SUNK_M;
+    if file.contacts.is_empty() && file.plant.object_has_weight() && !file.plant.tables.iter().any(lies) {
+        warnings.push("pose.position_m: the object lies on no table, and the hand is open: it falls".into());
+    }
 }
 
 /// Tells an object that is too heavy for the softness of tables.

@@ -112,8 +112,8 @@ pub enum Lost {
     /// The object went with the table when that went away.
     #[error("the object stayed on the table")]
     OnTable,
-    /// No two fingertips ever touched the object at once.
-    #[error("the object was never grasped: no two fingertips ever touched it at once")]
+    /// No two fingertips touched the object at once while the hand grasped.
+    #[error("the object was never grasped: no two fingertips touched it at once")]
     NeverGrasped,
     /// The rolling constraints are no longer independent (Eq. 28 has no solution).
     #[error("the rolling constraints became dependent")]

@@ -201,14 +201,14 @@ impl SimulatedHand {
                 let judge = Judge::new(self.period_s);
                 self.world = World::Grasp(Box::new(Held { plant, motors, judge, ticks: 0 }));
                 // What goes wrong in the very first tick is found in the next.
-                self.grasp(wanted_nm).or(Some(Happening::Grasped))
+                self.grasp(mode, wanted_nm).or(Some(Happening::Grasped))
             }
             World::Still => None,
             World::Grasp(held) if !grasps => {
                 self.world = World::PutBack { from_rad: held.plant.motion().angles_rad, ticks: 0 };
                 Some(Happening::LetGo)
             }
-            World::Grasp(_) => self.grasp(wanted_nm),
+            World::Grasp(_) => self.grasp(mode, wanted_nm),
             World::PutBack { ticks, .. } => {
                 *ticks += 1;
                 (*ticks > put_back).then(|| {
@@ -219,12 +219,12 @@ impl SimulatedHand {
         }
     }
 
-    fn grasp(&mut self, wanted_nm: &[f32; MAX_JOINTS]) -> Option<Happening> {
+    fn grasp(&mut self, mode: Mode, wanted_nm: &[f32; MAX_JOINTS]) -> Option<Happening> {
         let World::Grasp(held) = &mut self.world else { return None };
         let Held { plant, motors, judge, ticks } = &mut **held;
         *ticks += 1;
         let mut gone = None;
-        let moved = motors.turn(plant, wanted_nm, |plant, _| gone = judge.see(plant));
+        let moved = motors.turn(plant, wanted_nm, |plant, _| gone = judge.see(plant, mode));
         let lost = moved.err().map(|(_, lost)| lost).or(gone)?;
         self.world = World::PutBack { from_rad: plant.motion().angles_rad, ticks: 0 };
         Some(Happening::Lost(lost))

@@ -223,10 +223,12 @@ impl<C: Controller> Simulation<C> {
     /// The verdict on the run so far.
     pub fn summary(&self) -> Summary {
         let end_s = self.time_s(self.tick.min(self.ticks));
+        let lost = self.lost.or_else(|| self.judge.at_end().map(|lost| (end_s, lost)));
         let ending = Ending {
             scene: self.name.clone(),
-            duration_s: self.lost.map_or(end_s, |(t_s, _)| t_s),
-            lost: self.lost,
+            duration_s: lost.map_or(end_s, |(t_s, _)| t_s),
+            lost,
+            is_put_down: self.judge.is_put_down(),
             fault: self.fault.map(|raised| self.in_words(raised)),
             wall_s: self.computing.as_secs_f64(),
         };
@@ -305,7 +307,7 @@ impl<C: Controller> Simulation<C> {
                 mode: stepped.mode.words(),
             };
             sample = is_due.then(|| observer.sample(t_s, plant, &seen));
-            gone = judge.see(plant);
+            gone = judge.see(plant, stepped.mode);
         });
         self.lost = moved.err().map_or(gone.map(|lost| (t_s, lost)), |(substep, lost)| {
             let at_s = (self.period_us * substep as u64) as f64 / (1e6 * self.motors.substeps as f64);

@@ -31,7 +31,7 @@ pub struct Summary {
     /// The end of the run in a word.
     #[serde(default)]
     pub outcome: Outcome,
-    /// `true` if the object was in the hand to the end; where fingertips roll, if every one stayed on its face.
+    /// `true` if the object was in the hand to the end, or was put down; where fingertips roll, if every one stayed on its face.
     pub grasp_held: bool,
     /// Time at which the grasp was lost, s.
     pub lost_at_s: Option<f64>,
@@ -111,6 +111,8 @@ pub struct Ending {
     pub duration_s: f64,
     /// The time and the reason of the loss, if there was one.
     pub lost: Option<(f64, Lost)>,
+    /// `true` if the object was in the hand, and was put down.
+    pub is_put_down: bool,
     /// The fault that the controller ended in, in words.
     pub fault: Option<String>,
     /// Computing time, s.
@@ -138,7 +140,8 @@ impl Tally {
         self.friction_demand_at_end = 0.0;
         for (contact, pressed) in sample.contacts.iter().zip(&mut self.pressed) {
             let demand = friction_demand(contact);
-            if contact.normal_force_n > FLOOR * contact.full_force_n {
+            // Before touch, the law may pull a fingertip away from what is nearest to it.
+            if contact.normal_force_n > (FLOOR * contact.full_force_n).max(0.0) {
                 *pressed = true;
                 self.friction_demand_at_end = self.friction_demand_at_end.max(demand);
                 self.friction_demand_max = self.friction_demand_max.max(demand);
@@ -163,7 +166,7 @@ impl Tally {
             duration_s: ending.duration_s,
             settled: settle_time_s.is_some(),
             settle_time_s,
-            outcome: Outcome::of(ending.lost.map(|(_, lost)| lost), &end.slipped_m),
+            outcome: Outcome::of(ending.lost.map(|(_, lost)| lost), ending.is_put_down, &end.slipped_m),
             grasp_held: ending.lost.is_none(),
             lost_at_s: ending.lost.map(|(t_s, _)| t_s),
             lost_reason: ending.lost.map(|(_, reason)| reason.to_string()),
@@ -250,7 +253,8 @@ mod tests {
     fn summary(samples: &[Sample], lost: Option<(f64, Lost)>) -> Summary {
         let mut tally = Tally::default();
         samples.iter().for_each(|sample| tally.see(sample));
-        let ending = Ending { scene: "s".into(), duration_s: 1.0, lost, fault: None, wall_s: 0.5 };
+        let ending =
+            Ending { scene: "s".into(), duration_s: 1.0, lost, is_put_down: false, fault: None, wall_s: 0.5 };
         tally.summary(ending, samples.last())
     }
 

@@ -28,7 +28,7 @@ const TRACE: &str = "trace.csv";
 
 /// Run a scene in simulation: the controller of the firmware against the simulated hand and object
 ///
-/// Exit code 0: the grasp held; 1: it was lost; 2: bad input or usage.
+/// Exit code 0: the grasp held, to the end or until the object was put down; 1: it was lost, or there was none; 2: bad input or usage.
 #[derive(Args)]
 pub(crate) struct Arguments {
     #[arg(help = scene_help())]
@@ -207,6 +207,7 @@ pub(super) fn describe(summary: &Summary) -> String {
         "grasp",
         match (summary.lost_at_s, &summary.lost_reason) {
             (Some(t_s), Some(reason)) => format!("LOST at {t_s:.3} s: {reason}"),
+            _ if summary.outcome == Verdict::PutDown => "held, and put down".to_owned(),
             _ => match summary.last.slipped_m.iter().enumerate().max_by(|a, b| a.1.total_cmp(b.1)) {
                 Some((finger, slipped_m)) if summary.outcome == Verdict::Slipped => {
                     format!("held, but finger {} SLIPPED by {:.1} mm", finger + 1, slipped_m * 1e3)

@@ -136,6 +136,73 @@ fn a_hand_has_at_most_64_capsules() {
     );
 }
 
+/// A hand that begins open touches nothing, and stands where the scene says.
+#[test]
+fn a_hand_that_begins_open_touches_nothing() {
+    for (scene, settings, said) in [
+        (
+            "pick-cube",
+            &["start.posture=opn"][..],
+            "--set: start.posture: the hand `three-finger` has no posture `opn`; did you mean `open`?",
+        ),
+        (
+            "pick-cube",
+            &["start.angles_rad=[0]"],
+            "scenes/pick-cube.toml:14: start.posture: angles are given as well; leave start.posture or start.angles_rad out",
+        ),
+        (
+            "cube",
+            &["contact=[]"],
+            "--set: contact: 0 contacts for 3 fingertips; give one [[contact]] for each fingertip, in the hand's order; or none, and \
+             start.posture: then the hand begins open",
+        ),
+        (
+            "cube",
+            &["contact=[]", "start.posture=open"],
+            "--set: start.posture: fingertips that roll touch the object from the start on, and no [[contact]] says where; a hand that \
+             begins open needs plant.contact = \"coulomb\"",
+        ),
+        (
+            "pick-cube",
+            &["start.posture=preshape", "pose.position_m.2=-0.0205"],
+            "--set: start.posture: fingertip `finger-1` is 10.490 mm inside the object at the start; open the hand wider, or move the \
+             object (pose.position_m)",
+        ),
+        (
+            "pick-cube",
+            &["pose.position_m.3=0.13"],
+            "scenes/pick-cube.toml:26: plant.table.1.point_m: the object is 5.000 mm inside the table; move the table or the object's pose",
+        ),
+        (
+            "pick-cube",
+            &["pose.position_m.3=0.03"],
+            "scenes/pick-cube.toml:21: plant.links: the palm (capsule 3) is 4.000 mm inside the object at the start; move contacts or \
+             object, correct the hand's capsules, or set it to false",
+        ),
+        (
+            "cube-table",
+            &["start.posture=open"],
+            "scenes/cube-table.toml:15: contact.1: fingertip `finger-1` is 35.994 mm away from its face; change start.angles_rad or the pose",
+        ),
+    ] {
+        assert_eq!(load(scene, settings).expect_err(said).to_string(), said);
+    }
+    let thick = ["hand.fingertip.*.radius_m=0.07", "pose.position_m.1=0.3", "plant.table=[]"];
+    let near = load("pick-cube", &thick).expect_err("fingertips in each other");
+    assert_eq!((near.key.as_str(), near.remedy.as_str()), ("start", "open the hand wider"));
+    let falls = load("pick-cube", &["pose.position_m.3=0.12"]).unwrap();
+    assert_eq!(
+        falls.warnings,
+        ["pose.position_m: the object lies on no table, and the hand is open: it falls"]
+    );
+    let scene = load("pick-cube", &[]).unwrap();
+    assert_eq!(scene.start.angles_rad, scene.file.hand.postures[0].angles_rad);
+    assert!(scene.contacts.is_empty() && scene.start.points_m.is_empty());
+    assert_eq!(parse(&scene.effective_toml()).unwrap(), scene);
+    let angles = format!("start={{angles_rad={:?}}}", scene.start.angles_rad);
+    assert_eq!(load("pick-cube", &[&angles]).unwrap().start, scene.start);
+}
+
 /// With links switched off, only fingertips are in each other's way.
 #[test]
 fn links_may_be_inside_each_other_where_they_do_not_touch() {
