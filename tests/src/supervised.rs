@@ -130,6 +130,8 @@ impl Controller for Supervised {
             force_n: record.gains.grasp[0],
             mode: record.mode,
             fault: record.fault,
+            noticed: record.notice,
+            refused: record.answer.and_then(|answer| answer.refused),
         })
     }
 }

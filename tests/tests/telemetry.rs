@@ -273,6 +273,8 @@ impl Controller for Line {
             force_n: outputs.record.gains.grasp[0],
             mode: outputs.record.mode,
             fault: outputs.record.fault,
+            noticed: outputs.record.notice,
+            refused: outputs.record.answer.and_then(|answer| answer.refused),
         })
     }
 }

@@ -74,6 +74,7 @@ pub(super) fn scene(file: SceneFile) -> Result<Scene> {
         actuators: file.actuators.clone(),
         friction: file.friction.clone(),
         plant: file.plant.clone(),
+        script: file.steps(LONGEST_RUN_S)?,
         substep_s: file.plant.substep_s.unwrap_or(file.control.period_s / substeps as f64),
         substeps,
         warnings,

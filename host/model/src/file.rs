@@ -71,7 +71,37 @@ keys! {
         /// The simulated world.
         #[serde(default)]
         pub plant: PlantSettings,
+        /// What the hand is told, step by step, once it is armed; without it, to grasp at time 0.
+        #[serde(rename = "script", default, skip_serializing_if = "Vec::is_empty")]
+        pub script: Vec<StepFile>,
     }
+}
+
+keys! {
+    /// A step of a script. It is done when the one before it was, what it waits for has come, and its time is over.
+    #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+    #[serde(deny_unknown_fields)]
+    pub struct StepFile {
+        /// What the hand is told, in the words of `console`: `posture preshape`, `grasp`, `move z_mm=15 turn_z_deg=20`, `put-down`.
+        #[serde(rename = "do")]
+        pub order: String,
+        /// What the hand has to notice first, since the step before: `in-posture`, `holding`, `at-target`, `on-ground`, ...
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        pub when: Option<String>,
+        /// Time that is to pass then, s.
+        #[serde(default)]
+        pub after_s: f64,
+        /// Time from the beginning of the run before which it is not done, s.
+        #[serde(default)]
+        pub at_s: f64,
+        /// Longest time to wait for what it waits for, s; then the script is over.
+        #[serde(default = "ten")]
+        pub within_s: f64,
+    }
+}
+
+fn ten() -> f64 {
+    10.0
 }
 
 keys! {

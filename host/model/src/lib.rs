@@ -22,7 +22,9 @@ mod library;
 pub mod mesh;
 mod mjcf;
 mod object;
+pub mod order;
 mod read;
+mod script;
 mod start;
 #[cfg(test)]
 pub(crate) mod tests;
@@ -60,6 +62,7 @@ pub use library::is_of_files;
 pub use mjcf::Mjcf;
 pub use object::ObjectBody;
 pub(crate) use object::breaks_triangle;
+pub use script::Step;
 pub use tree::Setting;
 pub use urdf::{FingertipRequest, Starter, StarterRequest};
 
@@ -114,6 +117,8 @@ pub struct Scene {
     pub substeps: usize,
     /// Oddities that can be simulated, in words.
     pub warnings: Vec<String>,
+    /// What the hand is told, step by step.
+    pub script: Vec<Step>,
     /// The effective configuration.
     pub file: SceneFile,
 }

@@ -48,6 +48,7 @@ pub fn template(hand: HandFile, object: ObjectFile, ideal: bool) -> Result<Scene
             Actuators::default()
         },
         friction: Friction { scale: if ideal { 0.0 } else { 1.0 } },
+        script: Vec::new(),
         plant: PlantSettings::default(),
     })
 }

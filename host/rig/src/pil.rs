@@ -409,7 +409,8 @@ impl<P: Peer> Controller for Pilot<P> {
         torques_nm.iter_mut().zip(&record.torques_nm).for_each(|(torque, &told)| *torque = told);
         let (angles_rad, speeds_rad_s) = self.peer.motion_rad();
         let (force_n, mode, fault) = (record.gains.grasp[0], record.mode, record.fault);
-        Ok(Stepped { torques_nm, angles_rad, speeds_rad_s, force_n, mode, fault })
+        let (noticed, refused) = (record.notice, record.answer.and_then(|answer| answer.refused));
+        Ok(Stepped { torques_nm, angles_rad, speeds_rad_s, force_n, mode, fault, noticed, refused })
     }
 }
 

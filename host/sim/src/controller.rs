@@ -3,7 +3,8 @@
 
 use blindgrasp_body::{MAX_FINGERS, MAX_JOINTS};
 use blindgrasp_model::Scene;
-use blindgrasp_shared::command::Command;
+use blindgrasp_shared::command::{Command, Refusal};
+use blindgrasp_shared::cycle::Noticed;
 use blindgrasp_shared::event::{Event, Events};
 use blindgrasp_shared::fault::Raised;
 use blindgrasp_shared::parameter::ParameterError;
@@ -66,6 +67,10 @@ pub struct Stepped {
     pub mode: Mode,
     /// The fault that the hand is in.
     pub fault: Option<Raised>,
+    /// What the tick noticed by itself.
+    pub noticed: Option<Noticed>,
+    /// The reason for which its command was refused.
+    pub refused: Option<Refusal>,
 }
 
 /// The tick alone, as the scene configures it: no link, and so nobody whose heartbeat could stop.
@@ -124,6 +129,8 @@ impl Controller for Alone {
             force_n: output.record.gains.grasp[0],
             mode: output.record.mode,
             fault: output.record.fault,
+            noticed: output.record.notice,
+            refused: output.record.answer.and_then(|answer| answer.refused),
         };
         self.record = Some(output.record);
         Ok(stepped)

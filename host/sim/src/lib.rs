@@ -9,7 +9,7 @@
 //! 4. **Plant**: sub-steps up to the next period. Friction of the joints is the plant's.
 //! 5. **Sample**: the state at the beginning of the period, for whoever listens to the stream of [`Step`]s.
 //!
-//! Time 0 is the tick that is told to grasp. Before it the hand is armed while everything stands still, which starts the
+//! Time 0 is the tick that is told to grasp, or to do the first step of the scene's script. Before it the hand is armed while everything stands still, which starts the
 //! estimator. Everything is deterministic: the same scene and seed give the same bytes.
 
 pub mod controller;
@@ -21,6 +21,7 @@ pub mod motors;
 pub mod observe;
 pub mod recorder;
 pub mod sample;
+mod script;
 pub mod summary;
 pub mod thinned;
 pub mod verdict;
@@ -35,6 +36,7 @@ use blindgrasp_plant::coulomb::WorldError;
 use blindgrasp_plant::{Lost, Plant};
 use blindgrasp_shared::command::{Command, Grasp};
 use blindgrasp_shared::control::Laws;
+use blindgrasp_shared::cycle::Noticed;
 use blindgrasp_shared::fault::Raised;
 use blindgrasp_shared::parameter::ParameterError;
 use blindgrasp_shared::tick::Sensed;
@@ -44,6 +46,7 @@ use encoders::Encoders;
 use injection::{Injection, Injections, Sensing};
 use motors::Motors;
 use observe::{Observer, Seen};
+use script::Script;
 use std::num::NonZeroU64;
 use std::time::{Duration, Instant};
 use summary::{Ending, Summary, Tally};
@@ -106,6 +109,11 @@ pub struct Simulation<C = Alone> {
     judge: Judge,
     /// Torques on their way to the motors; `None` until the hand is armed.
     delay: Option<Delay>,
+    /// What the hand is told, if the scene has a script.
+    script: Script,
+    has_script: bool,
+    /// What it has noticed, and when, s.
+    noticed: Vec<(f64, Noticed)>,
     /// The next tick.
     tick: u64,
     last: Option<Sample>,
@@ -157,6 +165,9 @@ impl<C: Controller> Simulation<C> {
             controller,
             plant,
             delay: None,
+            script: Script::new(&scene.script),
+            has_script: !scene.script.is_empty(),
+            noticed: Vec::new(),
             tick: 0,
             last: None,
             tally: Tally::default(),
@@ -207,8 +218,13 @@ impl<C: Controller> Simulation<C> {
         }
         let begun = Instant::now();
         let tick = self.tick;
-        // 1, 2: sense and control. The first tick is told to grasp.
-        let stepped = self.control(Some(tick), (tick == 0).then_some(Command::Grasp(Grasp::CONFIGURED)))?;
+        // 1, 2: sense and control. Without a script, the first tick is told to grasp.
+        let t_s = self.time_s(tick);
+        let grasp = tick == 0 && !self.has_script;
+        let command = if grasp { Some(Command::Grasp(Grasp::CONFIGURED)) } else { self.script.due(t_s) };
+        let stepped = self.control(Some(tick), command)?;
+        self.script.see(t_s, stepped.noticed, stepped.refused);
+        self.noticed.extend(stepped.noticed.map(|noticed| (t_s, noticed)));
         self.fault = stepped.fault;
         self.first_fault = self.first_fault.or(stepped.fault.map(|raised| (tick, raised)));
         let wanted_nm =
@@ -230,6 +246,8 @@ impl<C: Controller> Simulation<C> {
             lost,
             is_put_down: self.judge.is_put_down(),
             fault: self.fault.map(|raised| self.in_words(raised)),
+            noticed: self.noticed.clone(),
+            shortfall: self.script.shortfall(),
             wall_s: self.computing.as_secs_f64(),
         };
         self.tally.summary(ending, self.last.as_ref())

@@ -4,6 +4,7 @@ use crate::sample::{ContactSample, Sample};
 use crate::verdict::Outcome;
 use blindgrasp_body::MAX_FINGERS;
 use blindgrasp_plant::Lost;
+use blindgrasp_shared::cycle::Noticed;
 use serde::{Deserialize, Serialize};
 
 /// Below this a joint counts as at rest, rad/s.
@@ -39,6 +40,12 @@ pub struct Summary {
     pub lost_reason: Option<String>,
     /// The fault that the controller ended in, in words.
     pub fault: Option<String>,
+    /// What the hand noticed, in words, and when, s.
+    #[serde(default)]
+    pub noticed: Vec<(f64, String)>,
+    /// The reason for which the scene's script was not done to the end.
+    #[serde(default)]
+    pub shortfall: Option<String>,
     /// The last instant.
     #[serde(rename = "final")]
     pub last: Last,
@@ -115,6 +122,10 @@ pub struct Ending {
     pub is_put_down: bool,
     /// The fault that the controller ended in, in words.
     pub fault: Option<String>,
+    /// What the hand noticed, and when, s.
+    pub noticed: Vec<(f64, Noticed)>,
+    /// The reason for which its script was not done to the end.
+    pub shortfall: Option<String>,
     /// Computing time, s.
     pub wall_s: f64,
 }
@@ -171,6 +182,8 @@ impl Tally {
             lost_at_s: ending.lost.map(|(t_s, _)| t_s),
             lost_reason: ending.lost.map(|(_, reason)| reason.to_string()),
             fault: ending.fault,
+            noticed: ending.noticed.iter().map(|(t_s, noticed)| (*t_s, noticed.to_string())).collect(),
+            shortfall: ending.shortfall,
             last: end,
             friction_demand_max: self.friction_demand_max,
             friction_demand_at_end: self.friction_demand_at_end,
@@ -253,8 +266,16 @@ mod tests {
     fn summary(samples: &[Sample], lost: Option<(f64, Lost)>) -> Summary {
         let mut tally = Tally::default();
         samples.iter().for_each(|sample| tally.see(sample));
-        let ending =
-            Ending { scene: "s".into(), duration_s: 1.0, lost, is_put_down: false, fault: None, wall_s: 0.5 };
+        let ending = Ending {
+            scene: "s".into(),
+            duration_s: 1.0,
+            lost,
+            is_put_down: false,
+            fault: None,
+            noticed: Vec::new(),
+            shortfall: None,
+            wall_s: 0.5,
+        };
         tally.summary(ending, samples.last())
     }
 

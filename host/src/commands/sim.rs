@@ -219,6 +219,12 @@ pub(super) fn describe(summary: &Summary) -> String {
     if let Some(fault) = &summary.fault {
         line("controller", fault.clone());
     }
+    if let Some(shortfall) = &summary.shortfall {
+        line("script", format!("NOT DONE to its end: {shortfall}"));
+    }
+    for (k, (t_s, words)) in summary.noticed.iter().enumerate() {
+        line(if k == 0 { "noticed" } else { "" }, format!("{t_s:.3} s: {words}"));
+    }
     line(
         "at rest",
         match summary.settle_time_s {

@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 
 /// Writes the enum and its tables from one line a notice.
 macro_rules! notices {
-    ($($name:ident = $words:literal;)*) => {
+    ($($name:ident = $key:literal, $words:literal;)*) => {
         /// A thing that is noticed.
         #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
         #[repr(u8)]
@@ -17,6 +17,11 @@ macro_rules! notices {
             /// Every notice, in the order of their bytes on the wire.
             pub const ALL: &[Self] = &[$(Self::$name),*];
 
+            /// Returns its name in scripts.
+            pub const fn key(self) -> &'static str {
+                match self { $(Self::$name => $key,)* }
+            }
+
             /// Returns it in words.
             pub const fn words(self) -> &'static str {
                 match self { $(Self::$name => $words,)* }
@@ -27,17 +32,17 @@ macro_rules! notices {
 
 #[rustfmt::skip]
 notices! {
-    InPosture     = "the posture is reached";
-    Touched       = "all fingertips touch: the grasp begins";
-    Empty         = "there is nothing between the fingertips: the hand opens again";
-    NeverTouched  = "this fingertip touches nothing, though others do: the hand opens again";
-    Holding       = "the grasp is at its force: what is held can be moved";
-    Lost          = "what was held is gone: the hand opens again";
-    AtTarget      = "the target is where it was to go";
-    Weighed       = "it is weighed";
-    OnGround      = "it stands on something";
-    Lowered       = "it was put down as far as is stated, and nothing was felt below it";
-    Opened        = "the grasp is let go";
+    InPosture     = "in-posture",      "the posture is reached";
+    Touched       = "touched",         "all fingertips touch: the grasp begins";
+    Empty         = "empty",           "there is nothing between the fingertips: the hand opens again";
+    NeverTouched  = "never-touched",   "this fingertip touches nothing, though others do: the hand opens again";
+    Holding       = "holding",         "the grasp is at its force: what is held can be moved";
+    Lost          = "lost",            "what was held is gone: the hand opens again";
+    AtTarget      = "at-target",       "the target is where it was to go";
+    Weighed       = "weighed",         "it is weighed";
+    OnGround      = "on-ground",       "it stands on something";
+    Lowered       = "lowered",         "it was put down as far as is stated, and nothing was felt below it";
+    Opened        = "opened",          "the grasp is let go";
 }
 
 /// A notice, and the fingertip that it is about.
