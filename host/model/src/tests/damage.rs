@@ -61,7 +61,7 @@ fn damaged_texts_never_panic() {
     let huge = format!("[{}]", "0.1,".repeat(20_000));
     let deep = "[".repeat(5_000);
     let mut numbers = Numbers(5);
-    let sources: Vec<Vec<String>> = ["cube", "prism-ideal"]
+    let sources: Vec<Vec<String>> = ["cube", "prism-ideal", "pick-cube"]
         .into_iter()
         .flat_map(|name| [tokens(text(name)), tokens(&load(name, &[]).unwrap().effective_toml())])
         .chain([tokens(&{
