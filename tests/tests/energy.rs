@@ -4,8 +4,10 @@
 use blindgrasp::model::Scene;
 use blindgrasp::sim::Simulation;
 use blindgrasp::sim::sample::{EnergySample, Sample};
+use blindgrasp_shared::command::{Command, Grasp};
 use blindgrasp_tests::numeric::order;
 use blindgrasp_tests::shipped::{as_shipped, load, run};
+use blindgrasp_tests::supervised::{self, Course};
 
 /// Returns the energy that is missing at a sample, J.
 fn missing_j(first: &EnergySample, now: &EnergySample) -> f64 {
@@ -90,4 +92,19 @@ fn dampers_and_friction_only_take() {
             );
         }
     }
+}
+
+/// A second grasp begins with the attitudes that the fingertips have then: their potential, which the first grasp has raised, is zero again.
+///
+/// Tolerance: a thousandth of what it was.
+#[test]
+fn a_second_grasp_is_seen_from_where_it_begins() {
+    let course = Course {
+        commands: vec![(1000, Command::Release), (1301, Command::Grasp(Grasp::CONFIGURED))],
+        ..Course::default()
+    };
+    let outcome = supervised::run(&load("cube", &["duration_s=1.5"]), &course);
+    let attitudes_j = |tick: usize| outcome.run.samples[tick].energies.potentials_j.grasp[1];
+    println!("{:.2e} J, {:.2e} J where the second grasp begins", attitudes_j(1300), attitudes_j(1301));
+    assert!(attitudes_j(1300) > 1e-9 && attitudes_j(1301) < 1e-3 * attitudes_j(1300));
 }

@@ -305,6 +305,7 @@ impl<C: Controller> Simulation<C> {
 
     /// Moves the plant on under the torques of one control period. Returns `true` if a sample was made.
     fn move_on(&mut self, tick: u64, wanted_nm: &[f32; MAX_JOINTS], stepped: &Stepped) -> bool {
+        self.observer.follow(stepped.mode, &self.plant);
         let joints = self.joint_names.len();
         let (angles_rad, speeds_rad_s) =
             (stepped.angles_rad.map(f64::from), stepped.speeds_rad_s.map(f64::from));

@@ -10,6 +10,7 @@ use crate::sample::{ContactSample, EnergySample, Sample};
 use blindgrasp_body::{Hand, MAX_FINGERS, MAX_JOINTS};
 use blindgrasp_plant::{Motion, Plant};
 use blindgrasp_shared::control::{Held, Latch, Laws, Stance};
+use blindgrasp_shared::supervisor::Mode;
 use nalgebra::Vector3;
 
 /// The law as it would be with perfect sensors, in the precision of the plant: what the run is compared with.
@@ -17,6 +18,8 @@ use nalgebra::Vector3;
 pub struct Observer {
     laws: Laws<f64, MAX_JOINTS>,
     latch: Latch<f64, MAX_JOINTS, MAX_FINGERS>,
+    /// The hand grasped at the instant before.
+    grasped: bool,
 }
 
 /// The controller's account of the tick that is observed.
@@ -37,7 +40,17 @@ pub struct Seen<'a> {
 impl Observer {
     /// Observes laws whose latch closes where a plant is.
     pub fn new(laws: Laws<f64, MAX_JOINTS>, start: &Plant) -> Self {
-        Self { laws, latch: Latch::of(&start.model().hand, start.posture(), &start.motion().angles_rad) }
+        let latch = Latch::of(&start.model().hand, start.posture(), &start.motion().angles_rad);
+        Self { laws, latch, grasped: false }
+    }
+
+    /// Takes the mode after a tick: where a grasp begins, the latch closes anew, as the controller's.
+    pub fn follow(&mut self, mode: Mode, plant: &Plant) {
+        let grasps = mode.is_grasp();
+        if grasps && !self.grasped {
+            self.latch = Latch::of(&plant.model().hand, plant.posture(), &plant.motion().angles_rad);
+        }
+        self.grasped = grasps;
     }
 
     /// Energy at this instant, after the velocities were solved for. The potentials are those of the whole law, also while

@@ -132,7 +132,7 @@ impl Judge {
         let Plant::Coulomb(friction) = plant else { return None };
         // A fault is no intention.
         if mode != Mode::Fault {
-            self.grasps = mode == Mode::Grasping;
+            self.grasps = mode.is_grasp() && mode != Mode::Releasing;
         }
         self.judge(&Seen::of(friction, self.grasps), plant.model().object.shape.radius_m())
     }
