@@ -73,7 +73,8 @@ impl Kind {
                     "hand-arm" "hand-arm-consistent" "hand-arm-firm" "hand-arm-normal-only"
                     "l-bracket" "two-finger-prism" "four-finger-cube" "allegro-like-prism"
                     "cube-table" "prism-table" "four-finger-cube-table" "allegro-like-prism-table"
-                    "brick-allegro" "over-an-edge" "too-weak" "pick-cube" "pick-prism"
+                    "brick-allegro" "over-an-edge" "too-weak" "pick-cube" "pick-prism" "pick-cube-four-finger"
+                    "pick-prism-allegro"
                 )
             }
             Self::Hand => {
@@ -82,7 +83,7 @@ impl Kind {
             Self::Object => {
                 built_in!("objects":
                     "prism" "cube" "hexagonal-prism" "cuboid" "cuboid-printed" "l-bracket" "octahedron"
-                    "brick" "heavy-cube" "cube-100g" "prism-100g"
+                    "brick" "heavy-cube" "cube-100g" "prism-100g" "hexagonal-prism-100g"
                 )
             }
         }

@@ -4,7 +4,8 @@
 //! - **Slow**: fingertips roll, so that the object turns by more than the frame of centres. Points fixed in the fingertips where they
 //!   touched (towards the centroid, at the latch) tell the object's pose, to a degree or so. They would make the fast loop unstable;
 //!   a slow one turns the target until the *object* has turned by what was asked for.
-//! - **Weight**: a bounded integral of the way that is left shifts the target until the frame is where it is to be.
+//! - **Weight**: a bounded integral of the way that is left, of the object by the same points, shifts the target until it is where it
+//!   is to be.
 //! - **Weighing**: the target goes slowly up and down again; the mean of the force on both ways is the weight, as what the joints'
 //!   friction takes has the opposite sign on the other way.
 //! - **Putting down**: the target sinks until the frame presses on something below, or to a stated depth below the latch's height.
@@ -263,7 +264,10 @@ impl<const F: usize> Carry<F> {
         way_m -= upwards * self.sunk_m;
         if self.work == Work::Follow {
             let most = if stiffness_n_m > 0.0 { config.integral_n / stiffness_n_m } else { 0.0 };
-            self.integral_m += (way_m - frame.pose.way_m) * (INTEGRAL_1_S * period_s);
+            // From the middle of the points of touch, not from that of the centres.
+            let about = about + latch.frame.centroid_m - self.points.centroid_m;
+            let left_m = way + about - goal.turn(&about) - upwards * self.sunk_m - object.way_m;
+            self.integral_m += left_m * (INTEGRAL_1_S * period_s);
             let length = norm(&self.integral_m);
             if length > most {
                 self.integral_m *= if length > 0.0 { most / length } else { 0.0 };
@@ -299,7 +303,7 @@ impl<const F: usize> Carry<F> {
             }
             Work::PutDown => {
                 self.sunk_m += config.put_down_m_s * period_s;
-                let is_on_ground = pull_n(&(way_m - self.integral_m)) < -config.put_down_n;
+                let is_on_ground = pull_n(&way_m) < -config.put_down_n;
                 let is_deep = dot(&way_m, &upwards) < -config.put_down_m;
                 if is_on_ground || is_deep {
                     // From here on, the target is where the frame is.
