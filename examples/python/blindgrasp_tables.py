@@ -102,6 +102,7 @@ PARAMETERS = [
     "encoder_reversed",
     "encoder_zero_count",
     "motor_reversed",
+    "attitude_error",
     "force_n",
     "attitude_stiffness_nm",
     "integral_gain_nm_rad",

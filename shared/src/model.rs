@@ -8,7 +8,7 @@
 //! keep every bit of every number. Their CRC is the hand's hash: equal hands have equal firmware.
 
 use crate::bytes::BufferTooSmall;
-use crate::control::{Chosen, FrameConfig, Hold, LawsConfig, PerGain};
+use crate::control::{AttitudeError, Chosen, FrameConfig, Hold, LawsConfig, PerGain};
 use crate::cycle::{CycleConfig, Postures};
 use crate::estimate::{Encoder, EstimatorConfig};
 use crate::fault::FaultConfig;
@@ -171,6 +171,7 @@ fn least<const J: usize>(head: &Head<J>) -> Config<J> {
             gains: PerGain::all(0.0),
             chosen: Chosen::NONE,
             frame: FrameConfig::least(),
+            attitude_error: AttitudeError::Sine,
             hold: Hold { damping_nm_s: [0.0; J], gravity_m_s2: None },
         },
         limits: LimitConfig::NONE,

@@ -8,7 +8,7 @@
 //! laws have their rows by the list of [laws](crate::control).
 
 use crate::command::Refusal;
-use crate::control::{GAIN_COUNT, GAINS, Gain, LAWS};
+use crate::control::{AttitudeError, GAIN_COUNT, GAINS, Gain, LAWS};
 pub use crate::parameter::Each;
 
 use crate::parameter::Text;
@@ -149,6 +149,7 @@ parameters! {
     ENCODER_REVERSED, Joint, Free,    "encoder_reversed",              "",          "1 where the count falls while the joint's angle rises, else 0", estimator.encoders[k].reversed;
     ENCODER_ZERO,     Joint, Free,    "encoder_zero_count",            "counts",    "Count at joint angle zero",                                 estimator.encoders[k].zero_count;
     MOTOR_REVERSED,   Joint, Free,    "motor_reversed",                "",          "1 where a positive voltage pushes the joint in its negative direction, else 0", motors.reversed;
+    ATTITUDE_ERROR,   Hand,  Free,    "attitude_error",                "",          "0 where the error of two fingertips' relative attitude is the sine of their turn, 1 where that of half their turn", laws.attitude_error;
 }
 
 /// Every row: those above, the gains, their limits, the laws.
@@ -391,6 +392,19 @@ impl Field for bool {
     fn put(&mut self, _: usize, value: Option<f32>) -> Result<(), Refusal> {
         let (Some(0.0) | Some(1.0)) = value else { return Err(Refusal::OutOfRange) };
         *self = value == Some(1.0);
+        Ok(())
+    }
+}
+
+impl Field for AttitudeError {
+    fn get(&self, k: usize) -> Option<f32> {
+        (*self == Self::HalfAngle).get(k)
+    }
+
+    fn put(&mut self, k: usize, value: Option<f32>) -> Result<(), Refusal> {
+        let mut is_half = false;
+        is_half.put(k, value)?;
+        *self = if is_half { Self::HalfAngle } else { Self::Sine };
         Ok(())
     }
 }

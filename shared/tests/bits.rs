@@ -3,6 +3,7 @@
 use crate::common;
 
 use blindgrasp_shared::command::{Command, Grasp, Move};
+use blindgrasp_shared::control::AttitudeError;
 use blindgrasp_shared::fault::{Fault, Raised};
 use blindgrasp_shared::supervisor::Mode;
 use blindgrasp_shared::telemetry::Record;
@@ -155,6 +156,22 @@ fn the_bits_of_the_cycle_are_those_of_every_other_machine() {
     assert_eq!(records, Fnv(0x691c_1cca_2853_4fc4));
 }
 
+/// The same hand with the other form of the attitude error.
+fn half_angle<const J: usize>() -> Config<J> {
+    let mut config = config();
+    config.laws.attitude_error = AttitudeError::HalfAngle;
+    config
+}
+
+#[test]
+fn the_bits_of_half_angles_are_those_of_every_other_machine() {
+    let (torques, records, ticks_in) = run::<12, 3>(&half_angle(), facing_counts(), false, grasps);
+    println!("torques {torques:?}, records {records:?}, ticks in each mode {ticks_in:?}");
+    assert!(ticks_in.iter().all(|&ticks| ticks >= 100), "{ticks_in:?}");
+    assert_eq!(torques, Fnv(0x7e11_ff3d_82da_db2d));
+    assert_eq!(records, Fnv(0x5e5c_9fb6_cfa7_80e2));
+}
+
 #[test]
 fn the_bits_do_not_depend_on_the_capacity() {
     assert_eq!(
@@ -168,5 +185,9 @@ fn the_bits_do_not_depend_on_the_capacity() {
     assert_eq!(
         run::<12, 3>(&earlier(), facing_counts(), false, grasps),
         run::<20, 5>(&earlier(), facing_counts(), false, grasps)
+    );
+    assert_eq!(
+        run::<12, 3>(&half_angle(), facing_counts(), false, grasps),
+        run::<20, 5>(&half_angle(), facing_counts(), false, grasps)
     );
 }

@@ -4,10 +4,10 @@ use crate::description::{Description, Placed};
 use crate::numeric::derivative;
 use crate::random::Draw;
 use blindgrasp_shared::control::{
-    Account, Chosen, FrameConfig, Grip, Held, Hold, Latch, Laws, LawsConfig, PerGain, Stance,
+    Account, AttitudeError, Chosen, FrameConfig, Grip, Held, Hold, Latch, Laws, LawsConfig, PerGain, Stance,
 };
 use blindgrasp_shared::hand::{Hand, Posture, Wrench};
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
 
 /// Capacity for joints.
 pub const JOINTS: usize = 30;
@@ -73,6 +73,13 @@ impl Case {
             description,
             draw,
         }
+    }
+
+    /// Returns the same with another form of the attitude error.
+    #[must_use]
+    pub fn with_attitude_error(self, attitude_error: AttitudeError) -> Self {
+        let config = LawsConfig { attitude_error, ..*self.law.config() };
+        Self { law: config.prepare(&self.hand).expect("the gains are good"), ..self }
     }
 
     /// Returns the posture for some angles, rad.
@@ -191,6 +198,20 @@ impl Case {
         -K_ST_NM * sum
     }
 
+    /// `cos(a/2)` of the turns `a` of neighbouring fingertips against each other since the latch, by their unit quaternions.
+    pub fn half_angle_cosines(now: &[Matrix3<f64>], then: &[Matrix3<f64>]) -> Vec<f64> {
+        let turn = |i: usize| now[i] * then[i].transpose();
+        let between = |i: usize| turn(i) * turn((i + 1) % now.len()).transpose();
+        let quaternion =
+            |matrix| UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(matrix));
+        (0..now.len()).map(|i| quaternion(between(i)).w.abs()).collect()
+    }
+
+    /// The potential of the attitude error's form that takes half of the angle, by unit quaternions.
+    pub fn half_angle_potential(now: &[Matrix3<f64>], then: &[Matrix3<f64>]) -> f64 {
+        Self::half_angle_cosines(now, then).iter().map(|cosine| 8.0 * K_ST_NM * (1.0 - cosine)).sum()
+    }
+
     /// `A = f_d / sum(r)`.
     pub fn stiffness(&self) -> f64 {
         FORCE_N / self.description.fingertips.iter().map(|tip| tip.radius_m).sum::<f64>()
@@ -218,6 +239,7 @@ pub fn law(hand: &RandomHand, k_st: f64, damping: &Torques, gravity: &Vector3<f6
         frame: FrameConfig::least(),
         gains: PerGain { grasp: [FORCE_N, k_st], ..PerGain::all(0.0) },
         chosen: Chosen::ALL,
+        attitude_error: AttitudeError::Sine,
         hold: Hold { damping_nm_s: *damping, gravity_m_s2: Some(*gravity) },
     };
     config.prepare(hand).expect("the gains are good")

@@ -13,7 +13,7 @@ use blindgrasp::body::{Hand, MAX_FINGERS, MAX_JOINTS, Posture};
 use blindgrasp::plant::integrator::Plant;
 use blindgrasp::plant::{Motion, ObjectModel, PlantModel};
 use blindgrasp_shared::control::{
-    self, Account, Chosen, FrameConfig, Hold, Latch, Laws, LawsConfig, PerGain, Stance,
+    self, Account, AttitudeError, Chosen, FrameConfig, Hold, Latch, Laws, LawsConfig, PerGain, Stance,
 };
 use blindgrasp_shared::math::Real;
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
@@ -118,6 +118,7 @@ impl Grasp {
             frame: FrameConfig::least(),
             gains: PerGain { grasp: [FORCE_N, ATTITUDE_STIFFNESS_NM], ..PerGain::all(0.0) },
             chosen: Chosen::ALL,
+            attitude_error: AttitudeError::Sine,
             hold: Hold { damping_nm_s, gravity_m_s2: Some(GRAVITY_M_S2) },
         };
         let laws = config.prepare(&hand).expect("the gains of Table VII are good");

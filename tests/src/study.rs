@@ -7,6 +7,7 @@ use blindgrasp::place::Placement;
 use blindgrasp::place::population::PlacingHand;
 use blindgrasp::sim::Simulation;
 use blindgrasp::sim::summary::Summary;
+use blindgrasp_shared::control::AttitudeError;
 use std::sync::Mutex;
 use std::thread;
 use std::time::Instant;
@@ -41,6 +42,8 @@ pub struct Outcome {
 pub struct Runs {
     /// In the paper's model.
     pub with: Summary,
+    /// In the paper's model, with the attitude error that takes half of the angle.
+    pub half_angle: Summary,
     /// In the paper's model, without `u_st`.
     pub without: Summary,
     /// With encoders, delay, limits and friction; none if the posture for the first touch can't be taken.
@@ -80,6 +83,8 @@ impl Study {
             let file = &placement.scene.file;
             let mut without = file.clone();
             without.control.gains.grasp[1] = 0.0;
+            let mut half_angle = file.clone();
+            half_angle.control.attitude_error = AttitudeError::HalfAngle;
             let real = SceneFile {
                 object: file.object.clone(),
                 pose: file.pose.clone(),
@@ -88,6 +93,7 @@ impl Study {
             };
             Runs {
                 with: simulate(&placement.scene),
+                half_angle: simulate(&Scene::build(half_angle).expect("the same scene")),
                 without: simulate(&Scene::build(without).expect("the same scene")),
                 real: Scene::build(real).ok().map(|scene| simulate(&scene)),
             }
@@ -96,11 +102,12 @@ impl Study {
     }
 
     /// Places an object and grasps it with its weight, on a table that goes away, with encoders, delay, limits, friction of the joints
-    /// and of the contacts: with `u_st`, without, and with the earlier law in its place, whose integral has this gain, N m/rad.
+    /// and of the contacts: with `u_st`, also by half angles, without, and with the earlier law in its place, whose integral has
+    /// this gain, N m/rad.
     ///
     /// # Errors
     /// The reason for which it is not placed.
-    pub fn on_a_table(&self, object: &ObjectFile, integral_nm_rad: f64) -> Result<[Summary; 3], String> {
+    pub fn on_a_table(&self, object: &ObjectFile, integral_nm_rad: f64) -> Result<[Summary; 4], String> {
         let mut all = self.with_links.place(object.clone(), 1).map_err(|none| none.to_string())?;
         let Placement { scene, quality } = all.swap_remove(0);
         let SceneFile { object, pose, contacts, .. } = scene.file;
@@ -110,8 +117,16 @@ impl Study {
         // Fingers that just touch stand otherwise than those that were placed.
         Scene::build(file.clone()).map_err(|error| error.to_string())?;
         let [_, attitude_nm] = file.control.gains.grasp;
-        Ok([(attitude_nm, 0.0), (0.0, 0.0), (0.0, integral_nm_rad)].map(|(attitude_nm, integral_nm_rad)| {
+        let sine = AttitudeError::Sine;
+        let laws = [
+            (attitude_nm, sine, 0.0),
+            (attitude_nm, AttitudeError::HalfAngle, 0.0),
+            (0.0, sine, 0.0),
+            (0.0, sine, integral_nm_rad),
+        ];
+        Ok(laws.map(|(attitude_nm, attitude_error, integral_nm_rad)| {
             let mut file = file.clone();
+            file.control.attitude_error = attitude_error;
             file.control.gains.grasp[1] = attitude_nm;
             file.control.gains.integral[0] = integral_nm_rad;
             simulate(&Scene::build(file).expect("the same scene"))

@@ -1,12 +1,13 @@
 //! The grasp law against the paper's formulas as they are printed: Eqs. 30-34 and 59 for the torques, Eqs. 43 and 44
 //! for the potentials.
 
-use blindgrasp_shared::control::{Held, Latch, Stance};
+use blindgrasp_shared::control::{AttitudeError, Held, Latch, LawsConfig, Stance};
 use blindgrasp_shared::hand::Wrench;
 use blindgrasp_tests::cases::{Case, JOINTS, K_ST_NM, RandomHand, cases, law};
-use blindgrasp_tests::numeric::Errors;
+use blindgrasp_tests::numeric::{Errors, derivative};
 use blindgrasp_tests::random::Draw;
 use nalgebra::{Matrix3, Vector3};
+use std::f64::consts::PI;
 
 /// Eq. 30 is the gradient of Eq. 43, with damping and the weight of the links beside it.
 ///
@@ -62,6 +63,118 @@ fn the_relative_attitudes_are_the_negative_gradient_of_their_potential() {
     assert!(potentials.largest() < 1e-13);
 }
 
+/// The form of the attitude error that takes half of the angle is the gradient of `8 K_st (1 - cos(a/2))` for each pair of
+/// neighbours, in fingertip frames that the law does not know.
+///
+/// Tolerance: 1e-10 of `2 N K_st`, as above: along one joint, the scalar part of a unit quaternion is first-degree in the
+/// sine and cosine of half the angle. Where it changes its sign, the potential has a kink: these cases are left out.
+#[test]
+fn half_angles_are_the_negative_gradient_of_their_potential() {
+    let (mut errors, mut potentials) = (Errors::new(), Errors::new());
+    let mut wide = 0;
+    for mut case in cases(2100, 600).map(|case| case.with_attitude_error(AttitudeError::HalfAngle)) {
+        let n = case.hand.fingertip_count() as f64;
+        let offsets = case.offsets();
+        let then = case.tip_frames(&offsets, &case.latched);
+        let now = case.tip_frames(&offsets, &case.angles);
+        let cosines = Case::half_angle_cosines(&now, &then);
+        if cosines.iter().any(|&cosine| cosine < 0.02) {
+            continue;
+        }
+        // Turns beyond 90 degrees.
+        wide += usize::from(cosines.iter().any(|&cosine| cosine < 0.7));
+        let gradient =
+            case.gradient(|placed| Case::half_angle_potential(&case.frames_of(&offsets, placed), &then));
+        let still = [0.0; JOINTS];
+        let (with, without) = (case.torques(&still, (0.0, 1.0)), case.torques(&still, (0.0, 0.0)));
+        for k in 0..case.hand.joint_count() {
+            errors.add((with[k] - without[k] + gradient[k]) / (2.0 * n * K_ST_NM));
+        }
+        let potential = case.monitor().potentials_j.grasp[1];
+        potentials.add((potential - Case::half_angle_potential(&now, &then)) / (n * K_ST_NM));
+        assert!(potential >= 0.0);
+    }
+    println!(
+        "half angles against the gradient: {errors}; their potential: {potentials}; {wide} beyond 90 degrees"
+    );
+    assert!(errors.largest() < 1e-10);
+    assert!(potentials.largest() < 1e-12);
+    assert!(wide > 50);
+}
+
+/// A hand of two fingers, of which the first joint of the first turns one fingertip against the other; and that joint's
+/// axis.
+fn one_turns(seed: u64) -> Case {
+    let mut draw = Draw::new(seed);
+    let description = loop {
+        let hand = draw.hand(false);
+        if hand.fingertips.len() == 2 {
+            break hand;
+        }
+    };
+    let mut case = Case::of(description, draw);
+    case.angles = case.latched;
+    case
+}
+
+/// Both forms of the attitude error over all angles up to half a turn, in a pair that is neighbours twice: the moment is
+/// `2 K_st` times `2 sin a` or `4 sin(a/2)`, about the axis of the turn; it is the slope of the potential, also within a
+/// degree of half a turn; at no angle the two differ to first order; the half angle's grows to twice the most of the sine's.
+///
+/// Tolerances: 2e-11 of `K_st` for moments: the trace is right to 1e-15 after chains of ten joints, `1 + trace` is 4e-4 where
+/// `cos(a/2)` is 0.01, and the moment eight; 1e-7 for the slope, whose rounding is 1e-15 over a step of 1e-3, and more near
+/// half a turn.
+#[test]
+fn half_angles_hold_up_to_half_a_turn() {
+    // The least cos(a/2) that is divided by: sin of half of what is left to half a turn.
+    const LEAST: f64 = 0.01;
+    let form = |case: &Case, by: f64| {
+        let mut angles = case.latched;
+        angles[0] += by;
+        let posture = case.posture(&angles);
+        let latch = case.latch();
+        let wrenches = case.attitude_wrenches(&posture, &latch);
+        assert!((wrenches[0].moment_nm + wrenches[1].moment_nm).norm() < 1e-15);
+        let about = -wrenches[0].moment_nm.dot(&posture.link(0).axis());
+        assert!((wrenches[0].moment_nm + posture.link(0).axis() * about).norm() < 1e-12 * K_ST_NM);
+        let grip = case.law.grip(&latch);
+        let (_, account) = case.with_grip(&angles, &case.speeds, Some(&grip));
+        (about / K_ST_NM, account.potentials_j.grasp[1] / K_ST_NM)
+    };
+    let sine = one_turns(4000);
+    let half = one_turns(4000).with_attitude_error(AttitudeError::HalfAngle);
+    let (mut errors, mut slopes) = (Errors::new(), Errors::new());
+    let (mut before, mut largest_of_sine) = (0.0, 0.0_f64);
+    for k in 1..=1800 {
+        let a = PI * f64::from(k) / 1800.0;
+        let (moment, _) = form(&half, a);
+        let (sine_a, cosine_a) = blindgrasp_shared::math::Real::sine_cosine(0.5 * a);
+        errors.add(moment - 8.0 * sine_a * (cosine_a / LEAST).min(1.0));
+        let slope = derivative(1e-3, |by| form(&half, a + by).1);
+        // The bound, in an angle; at half a turn the potential is symmetric.
+        let bound = PI - 2.0 * LEAST;
+        if (a - bound).abs() > 2e-3 && a < PI - 2e-3 {
+            slopes.add(moment - slope);
+        }
+        assert!(moment > before || a > bound - 2e-3, "{a}");
+        before = moment;
+        let (moment, _) = form(&sine, a);
+        errors.add(moment - 8.0 * sine_a * cosine_a);
+        largest_of_sine = largest_of_sine.max(moment);
+    }
+    let (most, _) = form(&half, PI - 2.001 * LEAST);
+    println!(
+        "moments of both forms: {errors}; against the slope of the potential: {slopes}; {most} at the most"
+    );
+    assert!(errors.largest() < 2e-11);
+    assert!(slopes.largest() < 1e-7);
+    assert!((most / largest_of_sine - 2.0).abs() < 1e-3);
+    // 1 / cos(a/2) is 1 + a^2 / 8.
+    let a = 1e-3;
+    let ratio = form(&half, a).0 / form(&sine, a).0;
+    assert!((ratio - 1.0 - 0.125 * a * a).abs() < 1e-11, "{ratio}");
+}
+
 /// `B_sti` of Eqs. 32 and 38 as printed: three cross products of the columns of `R_fi` with those of
 /// `R_fi,(i-1)d + R_fi,(i+1)d`, where `R_fi,jd = R_fj R_fj,ini^T R_fi,ini` (Eqs. 34 and 59).
 fn printed_moments(now: &[Matrix3<f64>], then: &[Matrix3<f64>]) -> Vec<Vector3<f64>> {
@@ -114,16 +227,8 @@ fn moments_are_those_of_the_print() {
 /// finger 2 is `2 K_st` times the sum of three cross products, `4 K_st sin(a)` for a relative turn by `a`.
 #[test]
 fn two_fingers_are_neighbours_twice() {
-    let mut draw = Draw::new(4000);
-    let description = loop {
-        let hand = draw.hand(false);
-        if hand.fingertips.len() == 2 {
-            break hand;
-        }
-    };
-    let mut case = Case::of(description, draw);
+    let mut case = one_turns(4000);
     // Only the first joint of the first finger has moved: the turn is by its angle about its axis.
-    case.angles = case.latched;
     case.angles[0] += 0.4;
     let posture = case.posture(&case.angles);
     let wrenches = case.attitude_wrenches(&posture, &case.latch());
@@ -165,7 +270,10 @@ fn a_trunk_feels_neither_term() {
         let (posture, latch) = (case.posture(&case.angles), case.latch());
         let n = case.hand.fingertip_count();
         let about = case.draw.vector(0.5);
-        for wrenches in [case.approach_wrenches(&posture), case.attitude_wrenches(&posture, &latch)] {
+        let config = LawsConfig { attitude_error: AttitudeError::HalfAngle, ..*case.law.config() };
+        let half_angle = config.prepare(&case.hand).expect("the gains are good").grasp;
+        let halves = half_angle.attitude_wrenches(&case.hand, &posture, &latch.grasp, K_ST_NM);
+        for wrenches in [case.approach_wrenches(&posture), case.attitude_wrenches(&posture, &latch), halves] {
             let moment_of = |i: usize, wrench: &Wrench<f64>| {
                 wrench.moment_nm + (posture.centres_m[i] - about).cross(&wrench.force_n)
             };

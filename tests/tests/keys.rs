@@ -78,7 +78,7 @@ fn value(rust: &str) -> &'static str {
         "InertiaFile" => "3 or 6 numbers",
         "BTreeMap<String, f64>" => "names with numbers",
         "Indentation" => "number or text",
-        "ContactLaw" => "text",
+        "ContactLaw" | "AttitudeError" => "text",
         "HandFile" | "ObjectFile" => "text or table",
         "Vec<ContactFile>" | "Vec<PushFile>" | "Vec<TableFile>" | "Vec<MoveFile>" | "Vec<TurnFile>"
         | "Vec<ShakeFile>" => "tables",

@@ -66,11 +66,12 @@ fn line(text: &mut String, name: &str, outcomes: &[(&Specimen, &Outcome)]) {
     let median = settled.get(settled.len() / 2).map_or("-".to_owned(), |t| format!("{t:.2}"));
     let _ = writeln!(
         text,
-        "{name:<20}{:>6}{:>8.1}{:>10.1}{:>7.1}{:>9.1}{:>10.1}{:>9.1}  {:>7.1}{:>9.1}{median:>8}",
+        "{name:<20}{:>6}{:>8.1}{:>10.1}{:>7.1}{:>12.1}{:>9.1}{:>10.1}{:>9.1}  {:>7.1}{:>9.1}{median:>8}",
         outcomes.len(),
         100.0 * runs.len() as f64 / all,
         100.0 * placements.map(|placement| placement.quality.chance).sum::<f64>() / all,
         share(&|runs| runs.with.grasp_held),
+        share(&|runs| runs.half_angle.grasp_held),
         share(&|runs| runs.without.grasp_held),
         share(&|runs| runs.without.grasp_held && !runs.with.grasp_held),
         share(&|runs| runs.with.settled),
@@ -83,12 +84,13 @@ fn line(text: &mut String, name: &str, outcomes: &[(&Specimen, &Outcome)]) {
 fn table(hulls: &[(Specimen, Outcome)], meshes: &[(Specimen, Outcome)]) -> String {
     let all: Vec<(&Specimen, &Outcome)> = hulls.iter().map(|(s, o)| (s, o)).collect();
     let mut text = format!(
-        "{:<20}{:>6}{:>8}{:>10}{:>7}{:>9}{:>10}{:>9}  {:>7}{:>9}{:>8}\n",
+        "{:<20}{:>6}{:>8}{:>10}{:>7}{:>12}{:>9}{:>10}{:>9}  {:>7}{:>9}{:>8}\n",
         "share in %",
         "count",
         "placed",
         "expected",
         "held",
+        "half-angle",
         "without",
         "only w/o",
         "at rest",
@@ -212,8 +214,10 @@ fn with_weight(count: usize) {
         "{} of {count} placed; on a table that goes away, {DENSITY} kg/m^3, friction 0.6:",
         placed.len()
     );
-    let mut held = [0; 3];
-    for (law, name) in ["with u_st", "without", "with the earlier law"].into_iter().enumerate() {
+    let mut held = [0; 4];
+    for (law, name) in
+        ["with u_st", "with u_st, half-angle", "without", "with the earlier law"].into_iter().enumerate()
+    {
         let mut counts: BTreeMap<String, usize> = BTreeMap::new();
         for summary in placed.iter().map(|runs| &runs[law]) {
             held[law] += usize::from(summary.grasp_held);

@@ -40,6 +40,7 @@ impl Setup<'_> {
                 turn_damping_s: T::from_f64(self.control.frame_turn_damping_s),
                 reach_m: T::from_f64(self.control.frame_reach_m),
             },
+            attitude_error: self.control.attitude_error,
             hold: Hold {
                 damping_nm_s: self.each(|joint| self.damping_nm_s(joint)),
                 gravity_m_s2: self.control.gravity_compensation.then(gravity),

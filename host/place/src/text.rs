@@ -2,7 +2,7 @@
 
 use super::Placement;
 use blindgrasp_model::file::{Indentation, SceneFile};
-use blindgrasp_shared::control::GAINS;
+use blindgrasp_shared::control::{AttitudeError, GAINS};
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
@@ -124,6 +124,9 @@ fn settings(text: &mut String, file: &SceneFile) {
         control.estimator_bandwidth_hz,
         control.end_stops,
     );
+    if control.attitude_error != AttitudeError::Sine {
+        let _ = writeln!(text, "attitude_error = \"half-angle\"   # of u_st: 4 sin(a/2)");
+    }
     if control.amplifier_start_ms != 0 {
         let _ = writeln!(text, "amplifier_start_ms = {}", control.amplifier_start_ms);
     }

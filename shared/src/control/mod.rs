@@ -14,6 +14,7 @@ pub mod integral;
 
 pub use frame::{FrameConfig, Held, Pose};
 pub use gain::{Gain, Ramp, Signal};
+pub use grasp::AttitudeError;
 pub use hold::Hold;
 
 use crate::bytes::{BufferTooSmall, Loader, Saver, SnapshotError};
@@ -339,6 +340,8 @@ pub struct LawsConfig<T, const J: usize> {
     pub chosen: Chosen,
     /// Damping and reach of the virtual frame.
     pub frame: FrameConfig<T>,
+    /// Form of the attitude error of the grasp law.
+    pub attitude_error: AttitudeError,
     /// The torques that act with every law and without.
     pub hold: Hold<T, J>,
 }

@@ -2,7 +2,7 @@
 
 #![allow(dead_code, reason = "each test file uses its part")]
 
-use blindgrasp_shared::control::{Chosen, FrameConfig, Hold, LawsConfig, PerGain};
+use blindgrasp_shared::control::{AttitudeError, Chosen, FrameConfig, Hold, LawsConfig, PerGain};
 use blindgrasp_shared::cycle::{CarryingConfig, ClosingConfig, CycleConfig, MovingConfig};
 use blindgrasp_shared::estimate::{Encoder, EstimatorConfig};
 use blindgrasp_shared::fault::FaultConfig;
@@ -89,6 +89,7 @@ pub(crate) fn config<const J: usize>() -> Config<J> {
             gains: PerGain { grasp: [5.0, 5e-3], ..PerGain::all(0.0) },
             chosen: Chosen::ALL,
             frame: FrameConfig::least(),
+            attitude_error: AttitudeError::Sine,
             hold: Hold { damping_nm_s, gravity_m_s2: Some(vector(0.0, 0.0, -9.81)) },
         },
         limits: LimitConfig {

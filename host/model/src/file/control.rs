@@ -1,7 +1,7 @@
 //! `[control]`: the gains of the laws, which the laws themselves declare, and what surrounds them.
 
 use super::key::FileKey;
-use blindgrasp_shared::control::{Chosen, GAINS, LAWS, PerGain};
+use blindgrasp_shared::control::{AttitudeError, Chosen, GAINS, LAWS, PerGain};
 use serde::de::{self, Error as _, MapAccess, Visitor};
 use serde::ser::SerializeMap;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
@@ -72,6 +72,10 @@ macro_rules! control {
 }
 
 control! {
+    /// Error of two fingertips' relative attitude, a turn by `a`, in `u_st`. `"sine"`: `2 sin a`, the paper's (Eq. 32).
+    /// `"half-angle"`: `4 sin(a/2)`, which is the same at small turns, does not fall beyond 90 degrees, and holds twice as
+    /// much there.
+    attitude_error: AttitudeError = AttitudeError::Sine;
     /// Factor on the damping gains of the hand's joints.
     damping_scale: f64 = 1.0;
     /// `true`: the term `g` of Eq. 30 holds the weight of the links.
