@@ -269,6 +269,20 @@ fn with_the_printed_gains_it_is_held_for_long_but_not_for_ever() {
     assert!(lost_sooner_s.is_some_and(|t_s| 5.0 * t_s < lost_at_s));
 }
 
+/// With the printed gains, and an attitude error that does not fall beyond 90 degrees, it is still held when the paper's form
+/// has lost it; it has not come to rest by then. Energy falls all the time.
+#[test]
+fn with_half_angles_the_printed_gains_hold_it() {
+    for (name, lost_s) in [("hand-arm", 75), ("hand-arm-consistent", 29)] {
+        let half_angle = run(name, &["duration_s=100", "control.attitude_error=half-angle"]);
+        tell(&half_angle);
+        assert!(half_angle.summary.grasp_held, "{:?}", half_angle.summary);
+        assert_eq!(half_angle.summary.energy.increase_max_j, 0.0, "energy never rises");
+        let speeds = [lost_s, 99].map(|t_s| fastest_joint_rad_s(&half_angle, t_s));
+        assert!(speeds[1] < speeds[0] && speeds[0] < 0.1, "{speeds:?}");
+    }
+}
+
 /// The same with a body that there can be; and in half the step the same forces, after 10 s of swinging.
 #[test]
 fn half_the_step_gives_the_same_forces() {

@@ -45,6 +45,12 @@ pub fn all(evidence: &Evidence, sweeps: &[Sweep]) -> Result<Vec<Choice>, Evidenc
             "the print's constraint drifts; here it holds to rounding".to_owned(),
         ),
         choice(
+            "Eq. 32",
+            "an attitude error of 2 sin a, which falls where fingertips are turned by more than 90 degrees",
+            "as printed; attitude_error = \"half-angle\" has 4 sin(a/2), which is the same at small turns",
+            format!("{}; {}", ends(arm), ends(evidence.run("hand-arm-half-angle")?)),
+        ),
+        choice(
             "Eqs. 39 and 50",
             "T_i + xi dr^2",
             "2 T_i + xi (d(dr)/dt)^2",

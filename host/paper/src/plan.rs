@@ -49,6 +49,12 @@ pub const PLAN: &[Planned] = &[
         "Sec. 5 with K_st = 0.3 N m instead of 0.05238",
     ),
     run(
+        "hand-arm-half-angle",
+        "hand-arm",
+        &["control.attitude_error=half-angle", "duration_s=90"],
+        "Sec. 5 as printed, but with the attitude error 4 sin(a/2) instead of 2 sin a",
+    ),
+    run(
         "hand-arm-consistent",
         "hand-arm-consistent",
         &["duration_s=90"],

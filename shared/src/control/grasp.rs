@@ -101,24 +101,21 @@ impl<'de> Deserialize<'de> for AttitudeError {
 /// axis is lost in rounding, the moment falls to zero in proportion to `cos(a/2)`, and so has a potential there too.
 const LEAST_COSINE_SQUARED: f64 = 1e-4;
 
-impl AttitudeError {
-    /// Returns the error and its potential, both for a stiffness of one, of a relative turn that is given by the axial vector
-    /// and the trace of its matrix.
-    #[inline]
-    fn of<T: Real>(self, axial: Vector3<T>, trace: T) -> (Vector3<T>, T) {
-        match self {
-            Self::Sine => (axial, T::from_i32(3) - trace),
-            Self::HalfAngle => {
-                // cos(a/2), as 1 + trace = 4 cos(a/2)^2; with the bound below it, both formulas are those of either side.
-                let squared = (T::one() + trace) * T::from_f64(0.25);
-                let least = T::from_f64(LEAST_COSINE_SQUARED);
-                let cosine = if squared > least { squared } else { least }.square_root();
-                let per_cosine = T::one() / cosine;
-                let missing = T::from_i32(2) - cosine - squared * per_cosine;
-                (axial * per_cosine, missing * T::from_i32(4))
-            }
-        }
-    }
+/// Returns the error `2 sin a` and its potential, both for a stiffness of one, of a relative turn that is given by the axial
+/// vector and the trace of its matrix.
+fn sine<T: Real>(axial: Vector3<T>, trace: T) -> (Vector3<T>, T) {
+    (axial, T::from_i32(3) - trace)
+}
+
+/// Returns the same of the error `4 sin(a/2)`.
+fn half_angle<T: Real>(axial: Vector3<T>, trace: T) -> (Vector3<T>, T) {
+    // cos(a/2), as 1 + trace = 4 cos(a/2)^2; with the bound below it, both formulas are those of either side.
+    let squared = (T::one() + trace) * T::from_f64(0.25);
+    let least = T::from_f64(LEAST_COSINE_SQUARED);
+    let cosine = if squared > least { squared } else { least }.square_root();
+    let per_cosine = T::one() / cosine;
+    let missing = T::from_i32(2) - cosine - squared * per_cosine;
+    (axial * per_cosine, missing * T::from_i32(4))
 }
 
 /// The attitudes of the fingertips when the grasp began, `R_fi,ini` (Eq. 59).
@@ -259,41 +256,69 @@ impl<T: Real> GraspLaw<T> {
         latch: &Latch<T, J, F>,
         stiffness_nm: T,
     ) -> ([Vector3<T>; F], T) {
-        // How far each fingertip turned since the latch, D_i.
-        let turns: [Matrix3<T>; F] =
-            core::array::from_fn(|i| product_transposed(&posture.attitudes[i], &latch.attitudes[i]));
-        let mut potentials = T::zero();
-        // What one fingertip feels from its neighbour; the neighbour feels the opposite.
-        let mut pull = |from: &Matrix3<T>, towards: &Matrix3<T>| {
-            let (axial, trace) = axial_and_trace(from, towards);
-            let (error, potential) = self.attitude_error.of(axial, trace);
-            potentials += potential;
-            error * stiffness_nm
-        };
-        let count = hand.fingertip_count();
-        let around = match (turns.first(), turns.get(count.wrapping_sub(1))) {
-            (Some(first), Some(last)) => pull(last, first),
-            _ => Vector3::zeros(),
-        };
-        let mut behind = around;
-        let moments_nm = core::array::from_fn(|i| {
-            if i >= count {
-                return Vector3::zeros();
-            }
-            let ahead = match turns.get(i + 1) {
-                Some(next) if i + 1 < count => pull(&turns[i], next),
-                _ => around,
-            };
-            let moment = ahead - behind;
-            behind = ahead;
-            moment
-        });
-        (moments_nm, potentials * stiffness_nm)
+        match self.attitude_error {
+            AttitudeError::Sine => hold_attitudes(hand, posture, latch, stiffness_nm, sine),
+            AttitudeError::HalfAngle => hold_half_angles(hand, posture, latch, stiffness_nm),
+        }
     }
+}
+
+// Not inlined: the paper's form beside it would pay for it.
+#[inline(never)]
+fn hold_half_angles<T: Real, const J: usize, const F: usize>(
+    hand: &Hand<T, J, F>,
+    posture: &Posture<T, J, F>,
+    latch: &Latch<T, J, F>,
+    stiffness_nm: T,
+) -> ([Vector3<T>; F], T) {
+    hold_attitudes(hand, posture, latch, stiffness_nm, half_angle)
+}
+
+/// The same with one form of the attitude error, so that the form is not asked for with each pair.
+#[inline(always)]
+fn hold_attitudes<T: Real, const J: usize, const F: usize>(
+    hand: &Hand<T, J, F>,
+    posture: &Posture<T, J, F>,
+    latch: &Latch<T, J, F>,
+    stiffness_nm: T,
+    error_of: impl Fn(Vector3<T>, T) -> (Vector3<T>, T),
+) -> ([Vector3<T>; F], T) {
+    // How far each fingertip turned since the latch, D_i.
+    let turns: [Matrix3<T>; F] =
+        core::array::from_fn(|i| product_transposed(&posture.attitudes[i], &latch.attitudes[i]));
+    let mut potentials = T::zero();
+    // What one fingertip feels from its neighbour; the neighbour feels the opposite.
+    let mut pull = |from: &Matrix3<T>, towards: &Matrix3<T>| {
+        let (axial, trace) = axial_and_trace(from, towards);
+        let (error, potential) = error_of(axial, trace);
+        potentials += potential;
+        error * stiffness_nm
+    };
+    let count = hand.fingertip_count();
+    let around = match (turns.first(), turns.get(count.wrapping_sub(1))) {
+        (Some(first), Some(last)) => pull(last, first),
+        _ => Vector3::zeros(),
+    };
+    let mut behind = around;
+    let moments_nm = core::array::from_fn(|i| {
+        if i >= count {
+            return Vector3::zeros();
+        }
+        let ahead = match turns.get(i + 1) {
+            Some(next) if i + 1 < count => pull(&turns[i], next),
+            _ => around,
+        };
+        let moment = ahead - behind;
+        behind = ahead;
+        moment
+    });
+    (moments_nm, potentials * stiffness_nm)
 }
 
 /// Axial vector and trace of `a b^T`: the sum of the cross products of the columns of `a` with those of `b`, and the
 /// sum of their dot products. Only the entries that these need are formed.
+// Inlined: called by both forms of the attitude error, it would not be otherwise.
+#[inline(always)]
 fn axial_and_trace<T: Real>(a: &Matrix3<T>, b: &Matrix3<T>) -> (Vector3<T>, T) {
     let entry = |row: usize, column: usize| {
         a[(row, 0)] * b[(column, 0)] + a[(row, 1)] * b[(column, 1)] + a[(row, 2)] * b[(column, 2)]
@@ -338,7 +363,7 @@ mod tests {
                 let first = turn(Vector3::new(0.0, 0.8, 0.6), 1.0);
                 let second = turn(axis, angle_rad) * first;
                 let (axial, trace) = axial_and_trace(&first, &second);
-                let (error, potential) = AttitudeError::HalfAngle.of(axial, trace);
+                let (error, potential) = half_angle(axial, trace);
                 assert!(error.iter().all(|entry| entry.is_finite()), "{degrees}: {error}");
                 assert!((-1e-5..8.0 + 1e-5).contains(&potential), "{degrees}: {potential}");
                 let size = norm(&error);
@@ -354,7 +379,7 @@ mod tests {
         assert!(off < 5e-3, "{off}");
         // Exactly half a turn, and entries that have been rounded to more than that.
         for trace in [-1.0_f32, -1.000_000_4] {
-            let (error, potential) = AttitudeError::HalfAngle.of(Vector3::new(3e-8, 0.0, -6e-8), trace);
+            let (error, potential) = half_angle(Vector3::new(3e-8, 0.0, -6e-8), trace);
             assert!(norm(&error) < 1e-5 && (potential - 7.96).abs() < 1e-3, "{error} {potential}");
         }
     }
