@@ -7,7 +7,7 @@ use blindgrasp::plant::Motion;
 use blindgrasp::plant::integrator::Plant;
 use blindgrasp::sim::{self, Simulation};
 use blindgrasp_shared::command::{Command, Grasp};
-use blindgrasp_shared::control::{Chosen, FrameConfig, Held, Hold, Latch, LawsConfig, Stance};
+use blindgrasp_shared::control::{AttitudeError, Chosen, FrameConfig, Held, Hold, Latch, LawsConfig, Stance};
 use blindgrasp_shared::cycle::CycleConfig;
 use blindgrasp_shared::estimate::{Encoder, EstimatorConfig};
 use blindgrasp_shared::fault::FaultConfig;
@@ -41,6 +41,7 @@ fn laws(scene: &Scene) -> LawsConfig<f32, J> {
     LawsConfig {
         gains: scene.control.gains.map(|&gain| gain as f32),
         chosen: Chosen::ALL,
+        attitude_error: AttitudeError::Sine,
         frame: FrameConfig::least(),
         hold: Hold {
             damping_nm_s: std::array::from_fn(|k| scene.joints[k].damping_gain_nm_s_rad as f32),

@@ -20,7 +20,8 @@
 //! - `V` is the sum of the potentials of the laws' gains, less the potential energy of the links' weight that is held. Each
 //!   but the last is its gain times a function of the posture. Gains that change (soft start, release) give and take potential
 //!   without any work: the drop is taken at the gains of the tick before.
-//! - A **target** that moves raises a potential, and what the joints then do for it was not fed by delays: it is taken off.
+//! - A **target** that moves, or a reference that is followed by a spring, brings energy in by the force on it times its way. What
+//!   the joints do for it was not fed by delays: it is taken off.
 //! - **Turns** are those of the counts themselves: the filter's angles are late. Over a way they err by a count in all,
 //!   however long it is.
 //! - **Torques** are the mean of the last two. What a tick computes acts from its end, or from the next tick on, as the
@@ -57,6 +58,8 @@ pub struct Ledger<const J: usize> {
     terms: PerGain<Term>,
     /// The weight that was held.
     weight: Term,
+    /// The springs by which something followed a way.
+    way: Term,
     work: Sum,
     damped: Sum,
     excess_j: f32,
@@ -111,6 +114,7 @@ impl<const J: usize> Ledger<J> {
             before_nm: [0.0; J],
             terms: PerGain::all(Term::NONE),
             weight: Term::NONE,
+            way: Term::NONE,
             work: Sum::zero(),
             damped: Sum::zero(),
             excess_j: 0.0,
@@ -130,14 +134,19 @@ impl<const J: usize> Ledger<J> {
         work *= half;
         self.work.add(work);
         // The weight is held or not: its gain is one.
-        let (terms, weight) = entry.law.map_or((PerGain::all(Term::NONE), Term::NONE), |law| {
+        let none = (PerGain::all(Term::NONE), Term::NONE, Term::NONE);
+        let (terms, weight, way) = entry.law.map_or(none, |law| {
             let terms =
                 law.gains.zip_with(&law.potentials_j, |&gain, &potential_j| Term { gain, potential_j });
-            (terms, Term::new(1.0, -law.weight_potential_j))
+            let way = Term::new(law.way_share, law.way_potential_j);
+            (terms, Term::new(1.0, -law.weight_potential_j), way)
         });
         let drops = terms.zip_with(&self.terms, Term::drop_since);
-        let drop = drops.iter().fold(0.0, |sum, drop| sum + drop) + weight.drop_since(&self.weight);
-        (self.terms, self.weight) = (terms, weight);
+        let mut drop = drops.iter().fold(0.0, |sum, drop| sum + drop) + weight.drop_since(&self.weight);
+        if way.gain > 0.0 {
+            drop += way.drop_since(&self.way);
+        }
+        (self.terms, self.weight, self.way) = (terms, weight, way);
         match entry.law {
             Some(&Account { damping_w, fed_j, .. }) => {
                 self.damped.add(damping_w * entry.period_s);
@@ -174,7 +183,7 @@ impl<const J: usize> Ledger<J> {
 impl<const J: usize> Ledger<J> {
     pub(crate) fn save(&self, joints: usize, to: &mut Saver<'_>) -> Result<(), BufferTooSmall> {
         to.f32s(&self.before_nm, joints)?;
-        for term in self.terms.iter().chain([&self.weight]) {
+        for term in self.terms.iter().chain([&self.weight, &self.way]) {
             to.f32(term.gain)?;
             to.f32(term.potential_j)?;
         }
@@ -188,7 +197,7 @@ impl<const J: usize> Ledger<J> {
     pub(crate) fn load(joints: usize, from: &mut Loader<'_>) -> Result<Self, SnapshotError> {
         let mut ledger = Self::new();
         from.f32s(&mut ledger.before_nm, joints)?;
-        for term in ledger.terms.iter_mut().chain([&mut ledger.weight]) {
+        for term in ledger.terms.iter_mut().chain([&mut ledger.weight, &mut ledger.way]) {
             *term = Term { gain: from.f32()?, potential_j: from.f32()? };
         }
         ledger.work = Sum { sum: from.f32()?, over: from.f32()? };

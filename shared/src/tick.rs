@@ -507,8 +507,8 @@ fn act<const J: usize, const F: usize>(params: &Params<J, F>, state: &mut State<
     };
     let Prepared { laws, limits, watch, .. } = &params.prepared;
     let stance = Stance { hand: &params.hand, posture, angles_rad, speeds_rad_s, held: &cycle.held };
-    let (mut torques_nm, account) = laws.torques(&stance, grip.as_ref());
-    stages::torques(params, drive, motion, posture, cycle, &mut torques_nm);
+    let (mut torques_nm, mut account) = laws.torques(&stance, grip.as_ref());
+    stages::torques(params, drive, motion, posture, cycle, &mut account, &mut torques_nm);
     // A limit makes an infinite torque finite: both sides of it are looked at.
     let wanted = watch.torques(&torques_nm);
     let limiting = limits.apply(angles_rad, speeds_rad_s, &state.torques_nm, &mut torques_nm);

@@ -143,6 +143,7 @@ fn its_wrench_is_exact() {
         let config = LawsConfig {
             gains: laws.gains.map(|&gain| gain as f32),
             chosen: laws.chosen,
+            attitude_error: laws.attitude_error,
             frame: FrameConfig { damping_s: 0.027, turn_damping_s: 0.01, reach_m: 0.015 },
             hold: blindgrasp_shared::control::Hold { damping_nm_s: [0.0; JOINTS], gravity_m_s2: None },
         };

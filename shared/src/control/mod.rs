@@ -386,7 +386,11 @@ pub struct Account<T> {
     pub weight_potential_j: T,
     /// Power that the damping takes, W.
     pub damping_w: T,
-    /// By how much targets that moved have raised the potentials since the tick before, J.
+    /// Potential of the springs by which joints or fingertips follow a way, J, and the share of them that acts.
+    pub way_potential_j: T,
+    /// That share.
+    pub way_share: T,
+    /// Energy that targets which moved have brought in since the tick before, J.
     pub fed_j: T,
 }
 
@@ -400,6 +404,8 @@ impl<T: Real> Account<T> {
             signals: PerSignal::all(zero),
             weight_potential_j: zero,
             damping_w: zero,
+            way_potential_j: zero,
+            way_share: zero,
             fed_j: zero,
         }
     }

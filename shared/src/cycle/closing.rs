@@ -8,6 +8,7 @@
 //! 40 ms. No estimated speed is looked at, which a little noise of the counts keeps off zero for ever. The grasp begins when that
 //! holds for **all** fingertips at once, for some time: one that touches alone pushes the object, or is pushed away by it.
 
+use super::Followed;
 use crate::bytes::{BufferTooSmall, Loader, Saver, SnapshotError};
 use crate::hand::frame::dot;
 use crate::hand::{Hand, Posture, Wrench};
@@ -204,7 +205,7 @@ impl<const F: usize> Closing<F> {
         }
     }
 
-    /// Adds the torques, N m, of a share of the forces.
+    /// Adds the torques, N m, of a share of the forces. Returns the energy of what follows.
     pub(crate) fn torques<const J: usize>(
         &self,
         config: &ClosingConfig,
@@ -212,8 +213,10 @@ impl<const F: usize> Closing<F> {
         posture: &Posture<f32, J, F>,
         speeds_rad_s: &[f32; J],
         share: f32,
+        period: Period,
         torques_nm: &mut [f32; J],
-    ) {
+    ) -> Followed {
+        let mut followed = Followed::NOTHING;
         let velocities_m_s = hand.fingertip_velocities(posture, speeds_rad_s);
         for (i, fingertip) in hand.prepared_fingertips().iter().enumerate() {
             let (centre, direction) = (&posture.centres_m[i], &self.directions[i]);
@@ -222,15 +225,22 @@ impl<const F: usize> Closing<F> {
             let off = self.origins_m[i] + direction * reference - centre;
             let mut pull = off * config.stiffness_n_m;
             let force = norm(&pull);
+            let lag = config.force_n / config.stiffness_n_m;
             if force > config.force_n {
                 pull *= config.force_n / force;
+                followed.potential_j += force * lag - 0.5 * config.force_n * lag;
+            } else {
+                followed.potential_j += 0.5 * force * force / config.stiffness_n_m;
             }
             let speed = if moves { config.speed_m_s } else { 0.0 };
             let slow = direction * speed - velocities_m_s[i];
             let force_n = (pull + slow * config.damping_n_s_m) * share;
+            followed.fed_j += dot(&force_n, direction) * (speed * period.seconds());
             let wrench = Wrench { force_n, moment_nm: Vector3::zeros() };
             hand.push(posture, fingertip.link, centre, &wrench, torques_nm);
         }
+        followed.potential_j *= share;
+        followed
     }
 
     pub(crate) fn save(&self, fingertips: usize, to: &mut Saver<'_>) -> Result<(), BufferTooSmall> {

@@ -67,6 +67,19 @@ impl<const J: usize> CycleConfig<J> {
     }
 }
 
+/// The energy of springs by which something follows a way.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Followed {
+    /// Their potential, J.
+    pub(crate) potential_j: f32,
+    /// Energy that the way brought in, in this tick, J.
+    pub(crate) fed_j: f32,
+}
+
+impl Followed {
+    pub(crate) const NOTHING: Self = Self { potential_j: 0.0, fed_j: 0.0 };
+}
+
 /// The memory of the cycle.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Cycle<const J: usize, const F: usize> {

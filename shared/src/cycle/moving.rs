@@ -7,6 +7,7 @@
 //! `J` is what a joint feels with the others free, `w` the bandwidth. `s` is the integral of the error, bounded: what overcomes the
 //! friction of the joints.
 
+use super::Followed;
 use super::path::Path;
 use crate::bytes::{BufferTooSmall, Loader, Saver, SnapshotError};
 use crate::estimate::Motion;
@@ -72,7 +73,7 @@ impl<const J: usize> Moving<J> {
         Self { path: Path::resting(angles_rad), integral_nm: [0.0; J] }
     }
 
-    /// Adds the torques of some of the joints, N m, at the place of this tick.
+    /// Adds the torques of some of the joints, N m, at the place of this tick. Returns the energy of what follows.
     pub(crate) fn torques(
         &mut self,
         config: &MovingConfig<J>,
@@ -80,7 +81,8 @@ impl<const J: usize> Moving<J> {
         motion: &Motion<J>,
         is_moved: impl Fn(usize) -> bool,
         torques_nm: &mut [f32; J],
-    ) {
+    ) -> Followed {
+        let mut followed = Followed::NOTHING;
         let place = self.path.place();
         let period_s = period.seconds();
         let per_s = 1_000_000.0 / period.microseconds() as f32;
@@ -93,8 +95,12 @@ impl<const J: usize> Moving<J> {
             let acceleration = place.per_tick2[k] * per_s * per_s;
             let integral = self.integral_nm[k] + inertia * w * w * w * INTEGRAL_SHARE * period_s * error;
             self.integral_nm[k] = integral.limited(-most, most);
-            torques_nm[k] += inertia * (acceleration + w * (2.0 * slow + w * error)) + self.integral_nm[k];
+            let torque = inertia * (acceleration + w * (2.0 * slow + w * error)) + self.integral_nm[k];
+            torques_nm[k] += torque;
+            followed.potential_j += 0.5 * inertia * w * w * error * error;
+            followed.fed_j += torque * place.per_tick[k];
         }
+        followed
     }
 
     pub(crate) fn save(&self, joints: usize, to: &mut Saver<'_>) -> Result<(), BufferTooSmall> {

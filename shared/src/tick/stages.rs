@@ -2,7 +2,7 @@
 
 use super::{Params, Prepared, State};
 use crate::command::{Command, Move, Refusal};
-use crate::control::Latch;
+use crate::control::{Account, Latch};
 use crate::cycle::{Carried, Closed, Cycle, Moving, Notice, Noticed, OPEN, PEAK};
 use crate::estimate::Motion;
 use crate::hand::{Posture, Turn};
@@ -260,6 +260,7 @@ pub(super) fn torques<const J: usize, const F: usize>(
     motion: &Motion<J>,
     posture: &Posture<f32, J, F>,
     cycle: &mut Cycle<J, F>,
+    account: &mut Account<f32>,
     torques_nm: &mut [f32; J],
 ) {
     let share = match drive {
@@ -273,7 +274,11 @@ pub(super) fn torques<const J: usize, const F: usize>(
     if share > 0.0 {
         let mut closing_nm = [0.0; J];
         let (closing, speeds_rad_s) = (&config.cycle.closing, &motion.speeds_rad_s);
-        cycle.closing.torques(closing, &params.hand, posture, speeds_rad_s, share, &mut closing_nm);
+        let hand = &params.hand;
+        let followed =
+            cycle.closing.torques(closing, hand, posture, speeds_rad_s, share, *period, &mut closing_nm);
+        (account.way_share, account.way_potential_j) = (share, followed.potential_j);
+        account.fed_j += followed.fed_j;
         for ((torque, closing), is_trunk) in torques_nm.iter_mut().zip(closing_nm).zip(trunk) {
             *torque += if *is_trunk { 0.0 } else { closing };
         }
@@ -281,7 +286,10 @@ pub(super) fn torques<const J: usize, const F: usize>(
     let count = params.hand.joint_count();
     let moves = |k: usize| k < count && (drive == Drive::Path || trunk.get(k).is_some_and(|trunk| *trunk));
     if !matches!(drive, Drive::Grip { .. }) {
-        cycle.moving.torques(&config.cycle.moving, *period, motion, moves, torques_nm);
+        let followed = cycle.moving.torques(&config.cycle.moving, *period, motion, moves, torques_nm);
+        account.way_share = 1.0;
+        account.way_potential_j += followed.potential_j;
+        account.fed_j += followed.fed_j;
     }
 }
 
