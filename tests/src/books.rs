@@ -72,11 +72,11 @@ pub struct Page {
 /// A scene's grasp with its encoders and its output delay, tick by tick, as [`sim`] runs it.
 ///
 /// # Panics
-/// If the scene can't be simulated, has no encoders or a delay of more than a tick, or loses its grasp.
+/// If the scene can't be simulated, has no encoders or a delay other than a tick or none, or loses its grasp.
 pub fn keep(scene: &Scene) -> Vec<Page> {
     let params: Params<MAX_JOINTS, MAX_FINGERS> =
         Params::new(scene.hand.cast(), &scene.controller_config()).unwrap_or_else(|error| panic!("{error}"));
-    assert!(scene.actuators.output_delay_ticks <= 1, "a tick of delay at most");
+    assert!([0.0, 1.0].contains(&scene.actuators.output_delay_ticks), "a tick of delay, or none");
     let mut state = State::new();
     let blindgrasp::plant::Plant::Rolling(mut plant) =
         sim::plant(scene).unwrap_or_else(|error| panic!("{error}"))
@@ -104,7 +104,7 @@ pub fn keep(scene: &Scene) -> Vec<Page> {
     for step in 0..=(scene.duration_s / scene.control.period_s).round() as usize {
         let last = output;
         output = control(&plant, (step == 0).then_some(Command::Grasp(Grasp::CONFIGURED)));
-        let acting = if scene.actuators.output_delay_ticks > 0 { &last } else { &output };
+        let acting = if scene.actuators.output_delay_ticks > 0.0 { &last } else { &output };
         let now_nm = acting.torques_nm.map(f64::from);
         let before_nm = applied_nm.replace(now_nm).unwrap_or(now_nm);
         for substep in 0..scene.substeps {

@@ -228,10 +228,10 @@ keys! {
     #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
     #[serde(deny_unknown_fields)]
     pub struct Actuators {
-        /// Control periods from the reading of the encoders to the torque that follows from it, 0 to 1000. A controller that
-        /// reads first and writes last has 1.
-        #[serde(default = "Actuators::output_delay_ticks")]
-        pub output_delay_ticks: u32,
+        /// Control periods from the reading of the encoders to the torque that follows from it, 0 to 1000, whole or not. A
+        /// controller that reads first and writes last has 1.
+        #[serde(default = "one")]
+        pub output_delay_ticks: f64,
         /// `false`: the motors have no torque limits, as in the paper's model.
         #[serde(default = "yes")]
         pub torque_limits: bool,
@@ -242,15 +242,9 @@ keys! {
     }
 }
 
-impl Actuators {
-    fn output_delay_ticks() -> u32 {
-        1
-    }
-}
-
 impl Default for Actuators {
     fn default() -> Self {
-        Self { output_delay_ticks: 1, torque_limits: true, slew_limit_nm_s: None }
+        Self { output_delay_ticks: 1.0, torque_limits: true, slew_limit_nm_s: None }
     }
 }
 

@@ -242,8 +242,8 @@ pub fn gains(scene: &Scene) -> String {
         1e3 * control.period_s
     );
     match scene.actuators.output_delay_ticks {
-        0 => {}
-        1 => words += ", a tick late",
+        0.0 => {}
+        1.0 => words += ", a tick late",
         ticks => words += &format!(", {ticks} ticks late"),
     }
     if control.soft_start_s > 0.0 {

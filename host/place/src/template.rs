@@ -43,7 +43,7 @@ pub fn template(hand: HandFile, object: ObjectFile, ideal: bool) -> Result<Scene
         control,
         sensors: Sensors { ideal, noise_counts: 0.0 },
         actuators: if ideal {
-            Actuators { output_delay_ticks: 0, torque_limits: false, slew_limit_nm_s: None }
+            Actuators { output_delay_ticks: 0.0, torque_limits: false, slew_limit_nm_s: None }
         } else {
             Actuators::default()
         },

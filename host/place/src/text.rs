@@ -137,7 +137,7 @@ fn settings(text: &mut String, file: &SceneFile) {
     }
     let _ = write!(
         text,
-        "\n[sensors]\nideal = {}\nnoise_counts = {:?}\n\n[actuators]\noutput_delay_ticks = {}\ntorque_limits = {}\n",
+        "\n[sensors]\nideal = {}\nnoise_counts = {:?}\n\n[actuators]\noutput_delay_ticks = {:?}\ntorque_limits = {}\n",
         file.sensors.ideal,
         file.sensors.noise_counts,
         file.actuators.output_delay_ticks,

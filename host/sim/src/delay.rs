@@ -14,8 +14,9 @@ pub struct Delay {
 }
 
 impl Delay {
-    /// So many control periods long, with the same torques all along it, N m.
-    pub fn new(ticks: u32, torques_nm: Torques) -> Self {
+    /// So many control periods long, with the same torques all along it, N m. What is left of a period beyond whole ones is the
+    /// [motors'](crate::motors).
+    pub fn new(ticks: f64, torques_nm: Torques) -> Self {
         Self { under_way: std::iter::repeat_n(torques_nm, ticks as usize).collect() }
     }
 
@@ -57,7 +58,7 @@ mod tests {
     #[test]
     fn torques_come_as_many_periods_later() {
         for ticks in [0, 1, 2, 7] {
-            let mut delay = Delay::new(ticks, [-1.0; MAX_JOINTS]);
+            let mut delay = Delay::new(f64::from(ticks), [-1.0; MAX_JOINTS]);
             for now in 0..20 {
                 let expected = if now < ticks { -1.0 } else { (now - ticks) as f32 };
                 assert_eq!(delay.pass([now as f32; MAX_JOINTS]), [expected; MAX_JOINTS], "{ticks} at {now}");

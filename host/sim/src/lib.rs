@@ -96,7 +96,7 @@ pub struct Simulation<C = Alone> {
     /// Ticks from one sample to the next.
     sample_ticks: u64,
     motors: Motors,
-    delay_ticks: u32,
+    delay_ticks: f64,
     /// The force `f_d` when all of it acts, N.
     force_n: f32,
     ideal: bool,

@@ -21,6 +21,9 @@ use std::io::{ErrorKind, Read, Write, stdin, stdout};
 fn main() -> Result<(), Box<dyn Error>> {
     let path = std::env::args_os().nth(1).ok_or("which scene?")?;
     let scene = Scene::load(path, &[])?;
+    if scene.actuators.output_delay_ticks.fract() != 0.0 {
+        return Err("torques are exchanged once a tick: the delay has to be in whole ticks".into());
+    }
     let count = scene.joints.len();
     let (mut controller, mut encoders) = (Alone::new(&scene)?, Encoders::new(&scene));
     let mut delay: Option<Delay> = None;

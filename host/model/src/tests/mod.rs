@@ -77,7 +77,7 @@ fn shipped_scenes_touch_and_have_no_warnings_but_known_ones() {
         assert_eq!(scene.substeps, if ideal { 10 } else { 2 }, "{name}");
         assert_eq!(scene.joints.iter().all(|joint| joint.torque_limit_nm.is_infinite()), ideal, "{name}");
         assert_eq!(scene.joints.iter().all(|joint| joint.friction.coulomb_nm == 0.0), ideal, "{name}");
-        assert_eq!(scene.actuators.output_delay_ticks, u32::from(!ideal), "{name}");
+        assert_eq!(scene.actuators.output_delay_ticks, f64::from(u8::from(!ideal)), "{name}");
         assert_eq!(scene.control.end_stops, !ideal, "{name}");
         assert_eq!(
             (

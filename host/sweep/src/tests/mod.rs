@@ -61,8 +61,8 @@ fn what_no_scene_knows_is_no_sweep() {
         ),
         ("control.force_n=much,more", "--vary: control.force_n: is string \"much\"; has to be a number"),
         (
-            "actuators.output_delay_ticks=0.5,1.5",
-            "--vary: actuators.output_delay_ticks: is floating point `0.5`; has to be a whole number, not negative",
+            "control.amplifier_start_ms=0.5,1.5",
+            "--vary: control.amplifier_start_ms: is floating point `0.5`; has to be a whole number, not negative",
         ),
         (
             "hand.control.force_n=1,2",

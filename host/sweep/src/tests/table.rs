@@ -17,7 +17,7 @@ fn cell<'a>(columns: &'a Columns<'_>, row: &'a Row, name: &str) -> Cell<'a> {
 fn columns_have_the_types_of_their_keys() {
     let axes = [
         "control.force_n=4,5",
-        "actuators.output_delay_ticks=0..1:2",
+        "control.amplifier_start_ms=0..1:2",
         "plant.gravity_on_object=true,false",
         "object=cube,prism",
         "hand.joint.*.encoder_counts_per_turn=20000,21600",
@@ -32,7 +32,7 @@ fn columns_have_the_types_of_their_keys() {
     assert_eq!(kinds, expected);
     let row = Row { run: plan.runs() - 1, outcome: Outcome::Refused("for this reason".into()) };
     assert_eq!(cell(&columns, &row, axes[0].split_once('=').unwrap().0), Cell::Double(5.0));
-    assert_eq!(cell(&columns, &row, "actuators.output_delay_ticks"), Cell::Whole(1));
+    assert_eq!(cell(&columns, &row, "control.amplifier_start_ms"), Cell::Whole(1));
     assert_eq!(cell(&columns, &row, "plant.gravity_on_object"), Cell::Truth(false));
     assert_eq!(cell(&columns, &row, "object"), Cell::Word("prism"));
     assert_eq!(cell(&columns, &row, "start.indentation_m"), Cell::Word("equilibrium"));
