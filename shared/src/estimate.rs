@@ -109,10 +109,16 @@ impl<const J: usize> EstimatorConfig<J> {
             let rad = rad * encoder.sign();
             *scale = Scale { zero_count: encoder.zero_count, rad, rad_s: rad / period_s };
         }
-        let pole = (1.0 - w) / (1.0 + w);
+        let pole = pole(self.bandwidth_hz, period_s);
         let rest = 1.0 - pole;
         Ok(Estimator { joint_count, n: 1.0 / w, keep: pole * pole, beta: rest * rest, period_s, scales })
     }
+}
+
+/// Returns the filter's double pole `t` for a bandwidth (Hz) and a tick period (s).
+pub fn pole(bandwidth_hz: f32, period_s: f32) -> f32 {
+    let w = core::f32::consts::PI * bandwidth_hz * period_s;
+    (1.0 - w) / (1.0 + w)
 }
 
 /// The encoder of one joint, prepared.

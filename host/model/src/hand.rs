@@ -109,6 +109,11 @@ fn is_placed(file: &HandFile) -> bool {
 }
 
 impl HandFile {
+    /// The materials of the fingertips.
+    pub fn fingertip_models(&self) -> Vec<FingertipModel> {
+        self.fingertips.iter().map(fingertip_parameters).collect()
+    }
+
     /// Its capsules, for the hand that is prepared from it; those of links that the hand does not have are left out.
     pub fn capsules(&self, hand: &Hand) -> Vec<Capsule> {
         let prepared = |file: &CapsuleFile| {
@@ -422,7 +427,7 @@ pub(super) fn joint_parameters(joint: &JointFile, file: &SceneFile) -> JointPara
     }
 }
 
-pub(super) fn fingertip_parameters(fingertip: &FingertipFile) -> FingertipModel {
+fn fingertip_parameters(fingertip: &FingertipFile) -> FingertipModel {
     FingertipModel {
         radius_m: fingertip.radius_m,
         stiffness_n_m2: fingertip.stiffness_n_m2,

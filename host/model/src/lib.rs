@@ -64,7 +64,7 @@ pub use object::ObjectBody;
 pub(crate) use object::breaks_triangle;
 pub use script::Step;
 pub use tree::Setting;
-pub use urdf::{FingertipRequest, Starter, StarterRequest};
+pub use urdf::{FingertipRequest, Starter, StarterRequest, TunedGains};
 
 /// A scene, checked and ready for the simulator.
 #[derive(Clone, Debug, PartialEq)]

@@ -3,7 +3,8 @@
 //! [`model`] says what is simulated, [`integrator`] advances it in time; [`coulomb`] does where contacts have friction, and
 //! [`Plant`] is either. The parts: the hand's [`dynamics`](blindgrasp_body::dynamics), [`contact`] of a
 //! fingertip with a face, joint [`friction`], `rotation` of the object, and `coupling`, the linear algebra that solves for all of
-//! them together. A `push` comes from outside. A [`ledger`] is kept of the energy that flows in and out.
+//! them together. A `push` comes from outside. A [`ledger`] is kept of the energy that flows in and out. [`small_motions`] linearises
+//! a grasp at rest.
 
 pub mod contact;
 pub mod coulomb;
@@ -17,6 +18,7 @@ pub mod model;
 mod plant;
 mod push;
 mod rotation;
+pub mod small_motions;
 mod surroundings;
 mod vectors;
 

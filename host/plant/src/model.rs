@@ -43,7 +43,7 @@ pub struct PlantModel {
 
 impl PlantModel {
     /// Sets the mass matrix of the hand, rotors included.
-    pub(crate) fn mass_matrix(&self, bodies: &[Body; MAX_JOINTS], mass: &mut JointMatrix) {
+    pub fn mass_matrix(&self, bodies: &[Body; MAX_JOINTS], mass: &mut JointMatrix) {
         mass_matrix(&self.hand, bodies, mass);
         for (k, rotor) in self.rotor_inertia_kg_m2.iter().enumerate() {
             mass[k][k] += rotor;

@@ -24,6 +24,7 @@ pub mod sample;
 mod script;
 pub mod summary;
 pub mod thinned;
+pub mod tune;
 pub mod verdict;
 mod world;
 

@@ -75,7 +75,7 @@ fn assert_is_text(text: &str) {
 
 fn urdf(file: &str, folder: &Path) -> bool {
     let request = StarterRequest { file: file.into(), folder: folder.into(), ..Default::default() };
-    let Some(starter) = accepted(request.start()) else { return false };
+    let Some(starter) = accepted(request.start(|_, _| None)) else { return false };
     let path = folder.join("new.toml");
     fs::write(&path, &starter.text).unwrap();
     assert!(hand(path.to_str().unwrap(), folder), "a new hand can't be used:\n{}", starter.text);

@@ -32,4 +32,4 @@ mod transform;
 mod xml;
 
 pub(super) use expand::{expand, file_of};
-pub use starter::{FingertipRequest, Starter, StarterRequest};
+pub use starter::{FingertipRequest, Starter, StarterRequest, TunedGains};

@@ -3,11 +3,12 @@
 mod check;
 mod export;
 mod new;
+mod tune;
 
 use super::Outcome;
 use clap::{Args, Subcommand};
 
-/// Hands: start one from a URDF, check one, write one as a URDF
+/// Hands: start one from a URDF, check one, tune one, write one as a URDF
 #[derive(Args)]
 #[command(arg_required_else_help = true)]
 pub(crate) struct Arguments {
@@ -20,6 +21,7 @@ enum Action {
     New(new::Arguments),
     Check(check::Arguments),
     Export(export::Arguments),
+    Tune(tune::Arguments),
 }
 
 /// Runs the command.
@@ -28,5 +30,6 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
         Action::New(arguments) => new::run(arguments),
         Action::Check(arguments) => check::run(arguments),
         Action::Export(arguments) => export::run(arguments),
+        Action::Tune(arguments) => tune::run(arguments),
     }
 }

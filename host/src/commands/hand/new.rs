@@ -3,7 +3,8 @@
 use super::super::Outcome;
 use anyhow::Context;
 use blindgrasp::files;
-use blindgrasp::model::{FingertipRequest, StarterRequest};
+use blindgrasp::model::{FingertipRequest, HandFile, HandModel, StarterRequest, TunedGains};
+use blindgrasp::sim::tune::SampledLoop;
 use clap::Args;
 use std::path::{Component, Path, PathBuf};
 
@@ -50,7 +51,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
         locked: arguments.locked.clone(),
         fingertips: arguments.fingertips.clone(),
     };
-    let starter = request.start()?;
+    let starter = request.start(tuned)?;
     for warning in &starter.warnings {
         eprintln!("blindgrasp: warning: {warning}");
     }
@@ -60,6 +61,13 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
     }
     eprintln!("blindgrasp: wrote {}", out.display());
     Ok(Outcome::Shown)
+}
+
+/// Returns the gains that a hand's nominal grasp bears the most delay with.
+fn tuned(model: &HandModel, file: &HandFile) -> Option<TunedGains> {
+    let nominal = |firmness| SampledLoop::nominal(model, file, true, firmness).ok();
+    let tuned = nominal(1.0)?.tuned(super::tune::MARGIN_TICKS, &nominal)?;
+    Some(TunedGains { bandwidth_hz: tuned.bandwidth_hz?, damping_nm_s_rad: tuned.damping_nm_s_rad })
 }
 
 /// Returns the name of a file for another in a folder: relative, unless it was named by an absolute path and is further

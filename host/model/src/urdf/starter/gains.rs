@@ -5,6 +5,7 @@ use super::super::super::error::SceneError;
 use super::super::super::file::HandFile;
 use super::super::super::hand::{posture, still_joints};
 use super::super::assembly::Assembly;
+use super::TunedGains;
 use super::fingertips::Tip;
 use super::text::Draft;
 use blindgrasp_body::dynamics::{Body, JointMatrix, mass_matrix, place_bodies};
@@ -21,7 +22,11 @@ pub(super) const FRICTION_SHARE: f64 = 0.004;
 /// A fingertip is made to press with at most so many times its finger's weight (4.4 in the paper's experiments), whatever the
 /// torque limits say: many URDFs say too much.
 pub(super) const WEIGHTS: f64 = 10.0;
-/// The words on the damping gains.
+/// The words on damping gains that are tuned.
+pub(super) const TUNED_RULE: &str = "\
+as `blindgrasp hand tune` says: so many inertias of the joint alone a second that the sampled\n\
+#   loop about a nominal grasp of 2 g, without joint friction, bears the most additional delay, with the estimator's bandwidth above.";
+/// The words on damping gains that are guessed, where no tuned ones are stable.
 pub(super) const DAMPING_RULE: &str = "\
 0.02 of the critical damping 2 sqrt(K H) of each joint alone. H is its inertia,
 #   K = force_n / sum(radius_m) * (1 - 1/fingertips) * lever^2 the stiffness that the law gives it. A joint that moves several
@@ -38,6 +43,8 @@ const TRUNK_DAMPING_HZ: f64 = 2.0;
 const STICKING_RATIO: f64 = 0.2;
 /// Of the file's [joint_defaults].
 const PRESLIDING_RAD: f64 = 2e-4;
+/// Bandwidth of the estimator that is not tuned, Hz.
+const BANDWIDTH_HZ: f64 = 50.0;
 /// Speed limits that nobody knows, rad/s.
 const SPEED_RAD_S: f64 = 10.0;
 /// A joint whose axis is closer to the fingertip's centre only turns it, m.
@@ -53,6 +60,10 @@ pub(super) struct Gains {
     pub(super) allowed_n: Option<f64>,
     pub(super) attitude_stiffness_nm: f64,
     pub(super) joints: Vec<JointGains>,
+    /// Bandwidth of the estimator, Hz.
+    pub(super) bandwidth_hz: f64,
+    /// `true` if damping and bandwidth are tuned.
+    pub(super) is_tuned: bool,
     pub(super) stiffnesses_n_m2: Vec<f64>,
 }
 
@@ -103,6 +114,8 @@ impl Gains {
             allowed_n: None,
             attitude_stiffness_nm: 1.0,
             joints: vec![joint; draft.needs.len()],
+            bandwidth_hz: BANDWIDTH_HZ,
+            is_tuned: false,
             stiffnesses_n_m2: vec![1e6; draft.tips.len()],
         }
     }
@@ -180,8 +193,20 @@ impl Gains {
             allowed_n: (allowed > most).then(|| rounded(allowed)),
             attitude_stiffness_nm: rounded(force_n * radii / tips / RADII),
             joints,
+            bandwidth_hz: BANDWIDTH_HZ,
+            is_tuned: false,
             stiffnesses_n_m2: draft.radii_m.iter().map(stiffness).collect(),
         })
+    }
+}
+
+impl Gains {
+    /// Takes gains that are tuned.
+    pub(super) fn tune(&mut self, tuned: &TunedGains) {
+        for (joint, damping_nm_s) in self.joints.iter_mut().zip(&tuned.damping_nm_s_rad) {
+            joint.damping_nm_s = rounded(*damping_nm_s);
+        }
+        (self.bandwidth_hz, self.is_tuned) = (tuned.bandwidth_hz, true);
     }
 }
 

@@ -51,6 +51,15 @@ pub struct FingertipRequest {
     pub radius_m: Option<f64>,
 }
 
+/// Gains that a hand is tuned to.
+#[derive(Clone, Debug, PartialEq)]
+pub struct TunedGains {
+    /// Bandwidth of the estimator, Hz.
+    pub bandwidth_hz: f64,
+    /// Damping gain of each joint, N m s/rad.
+    pub damping_nm_s_rad: Vec<f64>,
+}
+
 /// A hand's file to start from.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Starter {
@@ -63,11 +72,15 @@ pub struct Starter {
 }
 
 impl StarterRequest {
-    /// Reads the URDF, guesses what it can't say, and makes sure that the file can be used.
+    /// Reads the URDF, guesses what it can't say, and makes sure that the file can be used. Damping and the estimator's bandwidth are what
+    /// the hand, with all other guesses, is tuned to; where that is none, they are guessed too.
     ///
     /// # Errors
     /// One line: where, what is wrong, what to do.
-    pub fn start(&self) -> std::result::Result<Starter, SceneError> {
+    pub fn start(
+        &self,
+        tune: impl Fn(&HandModel, &HandFile) -> Option<TunedGains>,
+    ) -> std::result::Result<Starter, SceneError> {
         let path = self.folder.join(&self.file);
         let text = read_text(&path, ".urdf")?;
         let robot = Robot::parse(&text, &path.to_string_lossy())?;
@@ -78,9 +91,11 @@ impl StarterRequest {
             .map_err(on_command_line)?;
         // Kinematics and masses as any command will see them; gains do not matter to them.
         let (model, file) = self.hand(&draft.write(&Gains::preliminary(&draft), &Surfaces::default()))?;
-        let gains = Gains::new(&draft, &file, &model.hand)?;
+        let mut gains = Gains::new(&draft, &file, &model.hand)?;
         let mut surfaces = Surfaces::of(&draft, path.parent().unwrap_or(Path::new("")));
-        let (HandModel { hand, mut warnings, .. }, file) = self.hand(&draft.write(&gains, &surfaces))?;
+        let (model, file) = self.hand(&draft.write(&gains, &surfaces))?;
+        tune(&model, &file).iter().for_each(|tuned| gains.tune(tuned));
+        let HandModel { hand, mut warnings, .. } = model;
         let mut guesses = draft.guesses(&gains);
         guesses.extend(surfaces.guess());
         let odd: Vec<String> = surfaces.gap().into_iter().chain(overlap(&file, &hand)).collect();

@@ -238,7 +238,7 @@ impl<'a> Draft<'a> {
              period_s = 1e-3\n\
              soft_start_s = 0.3\n\
              amplifier_start_ms = 0                # whole ms from power to torque, by the amplifiers' data sheet; over the line it can only be made longer\n\
-             estimator_bandwidth_hz = 50.0\n\
+             {}estimator_bandwidth_hz = {:?}\n\
              end_stops = true\n\n\
              [joint_defaults]\n\
              encoder_counts_per_turn = 16384       # GUESS: 14 bits a turn of the joint; with a gear, motor counts times its ratio\n\
@@ -259,7 +259,9 @@ impl<'a> Draft<'a> {
             gains.force_n,
             gains::RADII,
             gains.attitude_stiffness_nm,
-            gains::DAMPING_RULE,
+            if gains.is_tuned { "# GUESS: tuned, see damping_gain_nm_s_rad.\n" } else { "" },
+            gains.bandwidth_hz,
+            if gains.is_tuned { gains::TUNED_RULE } else { gains::DAMPING_RULE },
             gains::FRICTION_SHARE,
         );
         if self.needs.iter().any(|needs| needs.torque) {

@@ -14,7 +14,7 @@ fn start(urdf: &str, change: impl Fn(&mut StarterRequest)) -> Result<(Folder, St
         ..StarterRequest::default()
     };
     change(&mut request);
-    match request.start() {
+    match request.start(|_, _| None) {
         Ok(starter) => Ok((folder, starter)),
         Err(error) => Err(folder.plain(&error.to_string())),
     }
@@ -256,7 +256,7 @@ fn surfaces_of_meshes_are_guessed() {
         base: Some("palm".into()),
         ..StarterRequest::default()
     };
-    let starter = request.start().unwrap();
+    let starter = request.start(|_, _| None).unwrap();
     let guess = "surfaces of links: 3 capsules in the smallest boxes around meshes";
     assert_eq!(starter.guesses.last().unwrap(), guess);
     let gap = "no surface, so that nothing touches it there: `right-2` (a mesh: its file is not found)";
