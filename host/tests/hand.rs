@@ -107,3 +107,18 @@ fn mistakes_are_one_line() {
         }
     }
 }
+
+/// Margins are told, gains with more are printed and written nowhere, and what can't be tuned is one line.
+#[test]
+fn tuned_gains_are_told() {
+    let folder = Folder::new();
+    let (out, said) = folder.done(&["hand", "tune", "two-finger", "--json"]);
+    assert!(said.is_empty(), "{said}");
+    let report: serde_json::Value = serde_json::from_str(&out).expect("it is JSON");
+    let margin = |of: &serde_json::Value| of["margins"]["delay_margin_ticks"].as_f64();
+    assert!(margin(&report).is_none_or(|ticks| ticks < 0.0), "the printed gains have none: {report}");
+    assert!(margin(&report["tuned"]).is_some_and(|ticks| ticks >= 0.5), "{report}");
+    assert_eq!(report["tuned"]["damping_nm_s_rad"].as_array().map(Vec::len), Some(8), "{report}");
+    let (out, _) = folder.done(&["hand", "tune", "two-finger"]);
+    assert!(out.contains("delay margin, ticks") && out.contains("estimator_bandwidth_hz = "), "{out}");
+}

@@ -214,3 +214,64 @@ fn exponential(a: &DMatrix<f64>) -> DMatrix<f64> {
     }
     sum
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use blindgrasp_shared::math::Real;
+    use nalgebra::DVector;
+
+    /// A single joint that is damped at a rate.
+    fn damped_joint(rate_1_s: f64, delay_ticks: f64) -> SampledLoop {
+        let one = |value: f64| DMatrix::from_element(1, 1, value);
+        let inertia = 3e-4;
+        let situation = Situation {
+            motions: SmallMotions {
+                inertia: one(inertia),
+                damping: one(0.0),
+                stiffness: one(0.0),
+                joints: one(1.0),
+            },
+            stiffness_nm_rad: one(0.0),
+            damping_nm_s_rad: one(-rate_1_s * inertia),
+            gains_nm_s_rad: DVector::from_element(1, rate_1_s * inertia),
+            inertias_kg_m2: vec![inertia],
+        };
+        SampledLoop { situations: vec![situation], period_s: 1e-3, delay_ticks, bandwidth_hz: None }
+    }
+
+    /// With `g = r T`, the speed of the joint follows `v' = v - g ((1 - f) v_n + f v_(n+1))`, `n` and `n + 1` ticks ago: stable up to
+    /// g = 2, 2, 1 and (sqrt(5) - 1) / 2 for delays of 0, 1/2, 1 and 2 ticks, by Jury's criterion.
+    #[test]
+    fn a_damped_joint_is_stable_up_to_what_theory_says() {
+        for (delay_ticks, limit) in
+            [(0.0, 2.0), (0.5, 2.0), (1.0, 1.0), (2.0, (Real::square_root(5.0_f64) - 1.0) / 2.0)]
+        {
+            assert!(damped_joint(0.999e3 * limit, delay_ticks).is_stable(), "{delay_ticks}");
+            assert!(!damped_joint(1.001e3 * limit, delay_ticks).is_stable(), "{delay_ticks}");
+        }
+        // From one tick on: the margin is where g = 0.7 lies between 1 and 0.618.
+        let margin = damped_joint(700.0, 1.0).delay_margin_ticks().expect("it is stable");
+        assert!((0.5..1.0).contains(&margin), "{margin}");
+        let slow = damped_joint(1.0, 0.0).modes();
+        assert!(
+            slow.len() == 1 && (slow[0].rate_1_s - 1.0).abs() < 1e-3 && slow[0].frequency_hz == 0.0,
+            "{slow:?}"
+        );
+    }
+
+    #[test]
+    fn the_exponential_is_that_of_a_known_matrix() {
+        // Of a rotation, far and near, and of a fast decay beside a slow one.
+        for angle in [1e-3_f64, 1.0, 700.0] {
+            let turned = exponential(&DMatrix::from_row_slice(2, 2, &[0.0, -angle, angle, 0.0]));
+            let (sine, cosine) = Real::sine_cosine(angle);
+            assert!((turned[(0, 0)] - cosine).abs() < 1e-11 && (turned[(1, 0)] - sine).abs() < 1e-11);
+        }
+        let fallen = exponential(&DMatrix::from_row_slice(2, 2, &[-1000.0, 0.0, 0.0, -1e-3]));
+        assert!(
+            fallen[(0, 0)].abs() < 1e-12 && (fallen[(1, 1)] - (-1e-3_f64).exp()).abs() < 1e-12,
+            "{fallen}"
+        );
+    }
+}
