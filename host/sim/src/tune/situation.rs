@@ -8,7 +8,7 @@ use blindgrasp_body::{FaceContact, JointFriction, MAX_FINGERS, MAX_JOINTS, Postu
 use blindgrasp_model::{HandFile, HandModel, Scene, posture};
 use blindgrasp_plant::small_motions::SmallMotions;
 use blindgrasp_plant::{ContactForce, Motion, ObjectModel, Plant, PlantModel, integrator};
-use blindgrasp_shared::control::{Hold, Latch, Laws, LawsConfig, Stance};
+use blindgrasp_shared::control::{FrameConfig, Held, Hold, Latch, Laws, LawsConfig, Stance};
 use blindgrasp_shared::math::Real;
 use nalgebra::{DMatrix, DVector, Matrix3, UnitQuaternion, Vector3};
 
@@ -56,7 +56,7 @@ impl Situation {
         model.friction = vec![JointFriction::default(); scene.joints.len()];
         let laws = firmer(scene.laws_config(), firmness).prepare(&scene.hand)?;
         let angles_rad = start_rad(scene);
-        let latch = Latch::of(&posture(&model.hand, &angles_rad), &angles_rad);
+        let latch = Latch::of(&model.hand, &posture(&model.hand, &angles_rad), &angles_rad);
         let start = Motion::at_rest(angles_rad, scene.start.position_m, scene.start.attitude);
         let [begun, rest] = settle(&model, start, &laws, &latch)?;
         let held = |(motion, forces): (Motion, Vec<ContactForce>)| {
@@ -72,7 +72,7 @@ impl Situation {
     pub fn of_plant(scene: &Scene, plant: &Plant) -> Result<Option<Self>, TuneError> {
         let Plant::Rolling(plant) = plant else { return Ok(None) };
         let (model, laws) = (model(scene), laws(scene)?);
-        let latch = Latch::of(&posture(&model.hand, &scene.start.angles_rad), &start_rad(scene));
+        let latch = Latch::of(&model.hand, &posture(&model.hand, &scene.start.angles_rad), &start_rad(scene));
         Ok(Some(Self::held(&model, plant.motion(), plant.forces(), &laws, &latch)))
     }
 
@@ -139,7 +139,7 @@ impl Situation {
             object_gravity_m_s2: Vector3::zeros(),
             pushes: Vec::new(),
         };
-        let latch = Latch::of(&here, &angles_rad);
+        let latch = Latch::of(&model.hand, &here, &angles_rad);
         let motion = Motion::at_rest(angles_rad, centroid_m, UnitQuaternion::identity());
         Ok(vec![Self::held(&model, &motion, &forces, &laws, &latch), Self::free(&model, &motion, &laws)])
     }
@@ -211,6 +211,12 @@ fn laws_of(hand: &HandModel) -> LawsConfig<f64, MAX_JOINTS> {
     LawsConfig {
         gains: laws.gains.map(|gain| f64::from(*gain)),
         chosen: laws.chosen,
+        attitude_error: laws.attitude_error,
+        frame: FrameConfig {
+            damping_s: laws.frame.damping_s.into(),
+            turn_damping_s: laws.frame.turn_damping_s.into(),
+            reach_m: laws.frame.reach_m.into(),
+        },
         hold: Hold {
             damping_nm_s: laws.hold.damping_nm_s.map(f64::from),
             gravity_m_s2: laws.hold.gravity_m_s2.map(|gravity| gravity.map(f64::from)),
@@ -228,8 +234,11 @@ fn torques_nm(
 ) -> [f64; MAX_JOINTS] {
     let mut posture = Posture::at_base();
     model.hand.forward_kinematics(angles_rad, &mut posture);
-    let stance = Stance { hand: &model.hand, posture: &posture, angles_rad };
-    laws.torques(&stance, speeds_rad_s, Some(&laws.grip(latch))).0
+    let hand = &model.hand;
+    let holds = laws.gains().frame.iter().any(|&gain| gain > 0.0);
+    let held = if holds { Held::at_latch(hand, &posture, &latch.frame) } else { Held::nothing() };
+    let stance = Stance { hand, posture: &posture, angles_rad, speeds_rad_s, held: &held };
+    laws.torques(&stance, Some(&laws.grip(latch))).0
 }
 
 /// Joint angles at the start of a scene, rad.
