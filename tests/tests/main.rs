@@ -26,6 +26,7 @@ mod robustness;
 mod science;
 mod tables;
 mod telemetry;
+mod touch;
 mod tune;
 mod two_fingers;
 mod urdf;
