@@ -1,6 +1,7 @@
 //! What crosses crates, and is fast: the science, the documents, the wire. What takes an emulator is beside it.
 
 mod architecture;
+mod carried;
 mod constraints;
 mod control;
 mod coulomb;

@@ -53,7 +53,7 @@ pub(crate) use error::one_line;
 pub use error::{Place, SceneError, suggestion};
 pub use file::{
     Actuators, Control, Friction, HandFile, ObjectFile, PlantSettings, PostureFile, Safety, SceneFile,
-    Sensors,
+    Sensors, StepFile,
 };
 pub use hand::posture;
 pub(crate) use hand::{Examined, direction, still_joints};
