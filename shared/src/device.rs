@@ -204,7 +204,7 @@ impl<const J: usize, const F: usize> Device<J, F> {
         self.params.config().motors.turn(&mut outputs.torques_nm);
         outputs.powered = record.mode.is_powered();
         outputs.part = self.part(record.tick, inputs.waiting);
-        outputs.telemetry = self.telemetry.due(inputs.waiting);
+        outputs.telemetry = self.telemetry.due(inputs.waiting, record.notice.is_some());
         record.decimation = self.telemetry.told_every();
         if outputs.telemetry.is_some() {
             record.sequence = self.telemetry.sent;
@@ -541,10 +541,14 @@ impl Telemetry {
         if self.has_inputs() { 1 } else { self.decimation.max(1) }
     }
 
-    /// Returns the form in which this tick is told.
-    fn due(&mut self, waiting: usize) -> Option<Form> {
+    /// Returns the form in which this tick is told. Nothing that was noticed is left out: there is no other record of it.
+    fn due(&mut self, waiting: usize, is_notable: bool) -> Option<Form> {
         if self.decimation == 0 {
             return None;
+        }
+        if is_notable {
+            (self.left, self.overdue) = (self.decimation - 1, 0);
+            return Some(Form::Full(self.signals));
         }
         if self.left > 0 {
             self.left -= 1;

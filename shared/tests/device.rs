@@ -445,6 +445,31 @@ fn records_come_as_asked_for() {
     assert_eq!(record.limiting.as_slice().len(), 0);
 }
 
+/// No record that is told later holds what was noticed.
+#[test]
+fn a_tick_that_has_noticed_something_is_told_in_full_whatever_waits() {
+    for signals in [Signals::ALL, Signals::FULL] {
+        for (decimation, waiting) in [(0, 0), (1, 7), (1000, 0), (1000, 7)] {
+            let mut bench = Bench::grasping();
+            bench.done(Request::Telemetry { decimation, signals });
+            bench.waiting = waiting;
+            bench.done(Request::Command(Command::Release));
+            let outputs: Vec<_> = (0..500)
+                .map(|tick| {
+                    let heartbeat = (tick % 50 == 0).then(|| bench.packet(Request::Heartbeat));
+                    bench.tick(heartbeat)
+                })
+                .collect();
+            let noticed: Vec<_> = outputs.iter().filter(|outputs| outputs.record.notice.is_some()).collect();
+            assert!(!noticed.is_empty());
+            for outputs in noticed {
+                let told = (decimation > 0).then_some(Form::Full(signals));
+                assert_eq!(outputs.telemetry, told, "{decimation}, {waiting}");
+            }
+        }
+    }
+}
+
 /// A value that postcard writes as one byte.
 fn postcard_byte<T: serde::de::DeserializeOwned>(byte: u8) -> T {
     postcard::from_bytes(&[byte]).expect("a byte")
