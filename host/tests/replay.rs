@@ -17,7 +17,7 @@ use blindgrasp_shared::link::message::Signals;
 use blindgrasp_shared::math::Real;
 use blindgrasp_shared::parameters::Parameter;
 use blindgrasp_shared::supervisor::Mode;
-use blindgrasp_shared::tick::{Params, State};
+use blindgrasp_shared::tick::State;
 use recorded::{AnyRecord, Fate, Hand, Session, Told, simulation};
 use std::path::{Path, PathBuf};
 use std::process::{Command as Process, Output};
@@ -269,9 +269,7 @@ fn damping_makes_the_difference_that_the_law_says() {
     let (hand, config, records) = unlimited(&path, 4000);
     // In Eq. 30, damping is a torque -C dq by itself: of another C, nothing differs but that.
     let change_nm_s = 0.02 - f64::from(config.laws.hold.damping_nm_s[4]);
-    let estimator =
-        Params::<MAX_JOINTS, { blindgrasp::body::MAX_FINGERS }>::new(hand.model.hand.cast(), &config)
-            .unwrap();
+    let estimator = hand.model.params(&config).unwrap();
     let (mut tracks, mut motion) = (Tracks::new(), Motion::still());
     let (mut squares, mut largest, mut powered) = (0.0, 0.0_f64, 0_u32);
     for (k, record) in records.iter().enumerate() {
@@ -394,8 +392,7 @@ fn recorded_folder(what: impl FnOnce(&mut Session)) -> (TempDir, PathBuf) {
 fn angles_of_a_recording_are_those_of_the_controller() {
     let (_folder, path) = folder();
     let (hand, config, _) = unlimited(&path, 500);
-    let params: Params<MAX_JOINTS, { blindgrasp::body::MAX_FINGERS }> =
-        Params::new(hand.model.hand.cast(), &config).unwrap();
+    let params = hand.model.params(&config).unwrap();
     let mut state: State<MAX_JOINTS, { blindgrasp::body::MAX_FINGERS }> = State::new();
     let mut decoder = Decoder::new();
     let recording = Recording::open(&path).unwrap();

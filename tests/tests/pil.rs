@@ -13,6 +13,7 @@ use blindgrasp::rig::pil::{Linked, Pilot, Plan};
 use blindgrasp::rig::twin::Twin;
 use blindgrasp::sim::injection::{Injection, Kind};
 use blindgrasp::sim::sample::Sample as PlantSample;
+use blindgrasp::sim::verdict::Outcome;
 use blindgrasp::sim::{Run, Simulation};
 use blindgrasp::wire::{Answer, Packet, Request, Sample};
 use blindgrasp_shared::command::{Command, Grasp, Refusal};
@@ -158,6 +159,18 @@ fn the_cube_is_grasped_by_the_earlier_law_as_in_the_simulation() {
     let scene = write("earlier-law-cube.toml", scene);
     let settings = ["control.attitude_stiffness_nm=0", "control.integral_gain_nm_rad=0.02"];
     grasps(&scene, &hand, 5_000, &settings);
+}
+
+/// The whole cycle: open, closing, carried, put down, open again.
+#[test]
+fn the_cube_is_picked_up_and_put_down_as_in_the_simulation() {
+    let scene = Scene::load("pick-cube", &[]).unwrap_or_else(|error| panic!("{error}"));
+    let looped = looped(&scene, piped(DEFAULT_HAND), &[]);
+    let summary = &looped.run.summary;
+    println!("{} ticks, {} bits differ", looped.run.samples.len(), looped.bits_differ);
+    assert_eq!(looped.bits_differ, 0, "{}", looped.compared);
+    assert_eq!((summary.outcome, &summary.shortfall, &summary.fault), (Outcome::PutDown, &None, &None));
+    assert_same(&looped.run, &Simulation::new(&scene).unwrap_or_else(|error| panic!("{error}")).run());
 }
 
 #[test]

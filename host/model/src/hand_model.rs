@@ -9,9 +9,10 @@ use super::{
     library::{Document, Kind, is_path},
     open,
 };
-use blindgrasp_body::{Hand, MAX_JOINTS};
+use blindgrasp_body::{Hand, MAX_FINGERS, MAX_JOINTS};
 use blindgrasp_shared::cycle::{NamedPosture, POSTURES_MOST, Postures};
 use blindgrasp_shared::model;
+use blindgrasp_shared::parameter::ParameterError;
 use blindgrasp_shared::tick::{Config, Params};
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
@@ -29,6 +30,8 @@ pub struct HandModel {
     pub hand: Hand,
     /// Names of the joints, in the hand's order.
     pub joint_names: Vec<String>,
+    /// Names of the fingertips, in the hand's order.
+    pub fingertip_names: Vec<String>,
     /// The controller's configuration; zero beyond the hand's joints.
     pub config: Config<MAX_JOINTS>,
     /// Its named postures.
@@ -138,9 +141,25 @@ impl HandModel {
             .to_vec()
     }
 
+    /// Returns the names of the postures.
+    pub fn posture_names(&self) -> Vec<String> {
+        self.postures.iter().map(|posture| posture.name.clone()).collect()
+    }
+
     /// Returns the postures as the controller has them.
     pub fn named_postures(&self) -> Postures<MAX_JOINTS> {
         named_postures(&self.postures)
+    }
+
+    /// Returns the parameters of its controller, with a configuration.
+    ///
+    /// # Errors
+    /// The first that can't be used.
+    pub fn params(
+        &self,
+        config: &Config<MAX_JOINTS>,
+    ) -> std::result::Result<Params<MAX_JOINTS, MAX_FINGERS>, ParameterError> {
+        Params::new(self.hand.cast(), config)?.with_postures(self.named_postures())
     }
 
     pub(crate) fn build(file: &HandFile) -> Result<Self> {
@@ -175,10 +194,20 @@ impl HandModel {
             return fail("control", format!("the controller refuses it: {error}"), "");
         }
         let joint_names = file.joints.iter().map(|joint| joint.name.clone()).collect();
+        let fingertip_names = file.fingertips.iter().map(|fingertip| fingertip.name.clone()).collect();
         let per_volt = |joint: &JointFile| joint.torque_per_volt_nm_v as f32;
         let torques_per_volt_nm_v = file.joints.iter().map(per_volt).collect();
         let (name, postures, warnings) = (file.name.clone(), file.postures.clone(), Vec::new());
-        Ok(Self { name, hand, joint_names, config, postures, torques_per_volt_nm_v, warnings })
+        Ok(Self {
+            name,
+            hand,
+            joint_names,
+            fingertip_names,
+            config,
+            postures,
+            torques_per_volt_nm_v,
+            warnings,
+        })
     }
 }
 

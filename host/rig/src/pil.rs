@@ -103,7 +103,7 @@ impl Plan {
                  the hand's to it"
             ));
         }
-        Ok(Self { params: Params::new(scene.hand.cast(), &config)?, hand })
+        Ok(Self { params: hand.params(&config)?, hand })
     }
 
     /// The scene's parameters, with the heartbeat that the hand wants of a host.
@@ -113,7 +113,7 @@ impl Plan {
     pub fn with_heartbeat(&self) -> Result<Params<MAX_JOINTS, MAX_FINGERS>, ParameterError> {
         let mut config = *self.params.config();
         config.faults.heartbeat_ms = self.hand.config.faults.heartbeat_ms;
-        Params::new(self.params.hand().clone(), &config)
+        self.hand.params(&config)
     }
 }
 

@@ -11,7 +11,7 @@ use blindgrasp_shared::link::message::Reply;
 use blindgrasp_shared::parameter::ParameterError;
 use blindgrasp_shared::telemetry::INTERFACE_VERSION;
 use blindgrasp_shared::telemetry::burst::Burst;
-use blindgrasp_shared::tick::{Params, State};
+use blindgrasp_shared::tick::State;
 use blindgrasp_wire::{Answer, Firmware, Packet, Sample, Turned};
 
 /// A device on the host.
@@ -27,7 +27,6 @@ impl Twin {
     /// # Errors
     /// The first parameter that the controller refuses.
     pub fn new(hand: &HandModel, clock: Clock) -> Result<Self, ParameterError> {
-        let params = Params::new(hand.hand.cast(), &hand.config)?;
         // Its names do not matter: the firmware tells its own.
         let image = Image {
             interface_version: INTERFACE_VERSION,
@@ -41,7 +40,7 @@ impl Twin {
             period_us: hand.config.period_us,
         };
         let identity = Identity::of(image, clock);
-        Ok(Self { device: Device::new(params, identity), burst: Box::new(Burst::new()) })
+        Ok(Self { device: Device::new(hand.params(&hand.config)?, identity), burst: Box::new(Burst::new()) })
     }
 
     /// One tick.

@@ -67,7 +67,7 @@ pub(crate) struct Arguments {
     /// Simulated time, s, in place of the number of ticks
     #[arg(long, value_name = "S", allow_negative_numbers = true, conflicts_with = "ticks")]
     duration: Option<f64>,
-    /// Number of ticks of the grasp [default: 10000; with --uart 1000]
+    /// Number of ticks of the grasp [default: 10000, or those of the scene's script; with --uart 1000]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     ticks: Option<u32>,
     /// Change a value of the scene, such as control.force_n=4 (may be repeated)
@@ -156,7 +156,10 @@ fn load(arguments: &Arguments) -> anyhow::Result<Scene> {
     let mut settings = arguments.settings.clone();
     settings.extend(arguments.duration.map(|s| format!("duration_s={s:?}")));
     let mut scene = Scene::load(name, &settings)?;
-    if arguments.duration.is_none() {
+    // Part of a script is no cycle.
+    let is_whole = arguments.duration.is_some()
+        || arguments.ticks.is_none() && !arguments.uart && !scene.script.is_empty();
+    if !is_whole {
         let ticks = arguments.ticks.unwrap_or(if arguments.uart { TICKS_BY_UART } else { TICKS });
         // The first is at time 0.
         scene.duration_s = f64::from(ticks - 1) * scene.control.period_s;

@@ -15,7 +15,6 @@ use blindgrasp_shared::link::{Receiver, encode, most_bytes};
 use blindgrasp_shared::parameters::Parameter;
 use blindgrasp_shared::telemetry::INTERFACE_VERSION;
 use blindgrasp_shared::telemetry::burst::Burst;
-use blindgrasp_shared::tick::Params;
 use serde::Serialize;
 use std::collections::VecDeque;
 use std::thread;
@@ -96,7 +95,7 @@ impl Firmware {
         }
         let clock = Clock::Emulated;
         let identity = Identity::of(image, clock);
-        let params = Params::new(hand.hand.cast(), &hand.config).expect("parameters");
+        let params = hand.params(&hand.config).expect("parameters");
         Self {
             device: Device::new(params, identity),
             burst: Box::new(Burst::new()),

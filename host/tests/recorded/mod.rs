@@ -17,7 +17,7 @@ use blindgrasp_shared::math::Real;
 use blindgrasp_shared::parameters::Parameter;
 use blindgrasp_shared::telemetry::burst::Burst;
 use blindgrasp_shared::telemetry::{INTERFACE_VERSION, Record};
-use blindgrasp_shared::tick::{Config, Input, Params, State, tick};
+use blindgrasp_shared::tick::{Config, Input, State, tick};
 use std::f64::consts::TAU;
 use std::path::Path;
 
@@ -102,7 +102,7 @@ fn device(model: &HandModel) -> Device<MAX_JOINTS, MAX_FINGERS> {
     };
     let reset = ResetCause::PowerOn;
     let identity = Identity { reset, ..Identity::of(image, Clock::External) };
-    Device::new(Params::new(model.hand.cast(), &model.config).unwrap(), identity)
+    Device::new(model.params(&model.config).unwrap(), identity)
 }
 
 /// Returns the description that the device of a hand gives of itself.
@@ -312,7 +312,7 @@ pub(crate) fn simulation(
     signals: Signals,
     mut input: impl FnMut(u32) -> Option<(Told, Option<Command>)>,
 ) -> Vec<AnyRecord> {
-    let params: Params<MAX_JOINTS, MAX_FINGERS> = Params::new(hand.model.hand.cast(), config).unwrap();
+    let params = hand.model.params(config).unwrap();
     let mut state = State::new();
     let mut writer = Writer::create(path, false).unwrap();
     let device = writer.add_device("hand");

@@ -5,7 +5,6 @@ use super::change::Change;
 use crate::mcap::{About, Setting};
 use blindgrasp_body::{MAX_FINGERS, MAX_JOINTS};
 use blindgrasp_model::HandModel;
-use blindgrasp_shared::hand::Hand;
 use blindgrasp_shared::tick::{Config, Params};
 
 /// The parameters of a controller of any hand.
@@ -17,7 +16,7 @@ pub(super) struct Model {
     pub(super) name: String,
     pub(super) hash: u32,
     pub(super) joint_names: Vec<String>,
-    hand: Hand<f32, MAX_JOINTS, MAX_FINGERS>,
+    hand: HandModel,
     /// The configuration that the firmware starts with.
     config: Config<MAX_JOINTS>,
 }
@@ -41,7 +40,8 @@ impl Model {
         }
         let mut config = hand.config;
         config.period_us = about.period_us;
-        Ok(Self { name: hand.name, hash, joint_names: hand.joint_names, hand: hand.hand.cast(), config })
+        let (name, joint_names) = (hand.name.clone(), hand.joint_names.clone());
+        Ok(Self { name, hash, joint_names, hand, config })
     }
 
     /// A configuration, or the one that the firmware starts with, with recorded parameters.
@@ -60,7 +60,7 @@ impl Model {
 
     /// A controller of this configuration.
     pub(super) fn params(&self, config: &Config<MAX_JOINTS>) -> Result<AnyParams, ReplayError> {
-        Params::new(self.hand.clone(), config).map_err(ReplayError::Parameters)
+        self.hand.params(config).map_err(ReplayError::Parameters)
     }
 
     /// A controller of this configuration, changed.
@@ -71,7 +71,7 @@ impl Model {
     ) -> Result<AnyParams, ReplayError> {
         let mut config = *config;
         changes.iter().try_for_each(|change| change.apply(&mut config, &self.joint_names))?;
-        Params::new(self.hand.clone(), &config).map_err(ReplayError::Changed)
+        self.hand.params(&config).map_err(ReplayError::Changed)
     }
 }
 
