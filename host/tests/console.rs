@@ -24,13 +24,12 @@ use blindgrasp_shared::store::{Store, StoreError};
 use blindgrasp_shared::supervisor::Mode;
 use blindgrasp_shared::telemetry::INTERFACE_VERSION;
 use blindgrasp_shared::telemetry::burst::Burst;
-use blindgrasp_shared::tick::Params;
 use flash::Memory;
 use serde::Serialize;
 use std::collections::VecDeque;
 use std::time::{Duration, Instant};
 
-/// A board with the image `hand` whose joints stand still in the hand's nominal posture.
+/// A board with the image `hand` whose joints stand still in the hand's posture `open`.
 struct Board {
     device: Device<MAX_JOINTS, MAX_FINGERS>,
     burst: Box<Burst<MAX_JOINTS>>,
@@ -82,10 +81,10 @@ impl Board {
         // A finger: abduction, and three knuckles that bend.
         let mut counts = [0; MAX_JOINTS];
         for (k, count) in counts.iter_mut().enumerate().take(hand.hand.joint_count()) {
-            let angle_rad = [0.0, -0.45, 0.75, 0.75][k % 4];
+            let angle_rad = [0.0, -0.904, 0.749, 0.894][k % 4];
             *count = (angle_rad / hand.config.estimator.encoders[k].rad_per_count) as i32;
         }
-        let mut params = Params::new(hand.hand.cast(), &hand.config).expect("parameters");
+        let mut params = hand.params(&hand.config).expect("parameters");
         let mut store = memory.map(|memory| Store::open(memory).expect("it can be read"));
         let restored = store.as_mut().map(|store| {
             store.prepare().expect("there is power");
@@ -634,7 +633,8 @@ mod command {
 
     #[test]
     fn a_script_arms_grasps_releases_and_stops() {
-        let (output, said, errors) = type_all(Board::new(), "arm\ngrasp 0.5 0.002\nstatus\nrelease\nstop\n");
+        let script = "arm\ngrasp 0.5 0.002\nwait holding\nstatus\nrelease\nwait opened 2\nstop\n";
+        let (output, said, errors) = type_all(Board::new(), script);
         assert_eq!((output.status.code(), errors.as_str()), (Some(0), ""), "{said}");
         let first = [
             "blindgrasp 0.0.1 (00000001), image `hand` for the hand `three-finger`",
@@ -644,14 +644,57 @@ mod command {
         assert_lines(&said, &["last crash: hard fault at 0x08001234"]);
         assert_lines(
             &said,
-            &["arm: done", "grasp: done", "mode       grasping", "release: done", "stop: done", "stop: done"],
+            &[
+                "arm: done",
+                "grasp: done",
+                "all fingertips touch: the grasp begins",
+                "the grasp is at its force: what is held can be moved",
+                "mode       carrying",
+                "held       x_mm=0 y_mm=0 z_mm=0 turn_x_deg=0 turn_y_deg=0 turn_z_deg=0",
+                "release: done",
+                "the grasp is let go",
+                "stop: done",
+                "stop: done",
+            ],
         );
         assert_lines(
             &said,
             &["fault      none", "link  ", "joint name ", "0     finger-1-abduct ", "3     finger-1-flex-3 "],
         );
         let row = said.lines().find(|line| line.starts_with("1     finger-1-flex-1 ")).expect("a row");
-        assert!(row.contains(" -0.450 "), "{row}");
+        assert!(row.contains(" -0.904 "), "{row}");
+    }
+
+    #[test]
+    fn a_script_ends_where_what_it_waits_for_does_not_come() {
+        let script = "arm\nwait holding 0.2\ngrasp\n";
+        let (output, said, errors) = type_all(Board::new(), script);
+        assert_eq!(output.status.code(), Some(1), "{said}{errors}");
+        assert!(said.contains("stop: done") && !said.contains("grasp:"), "{said}");
+        let wanted = [
+            "blindgrasp: wait: `holding` did not come within 0.2 s",
+            "blindgrasp: line 2 of the script was not done, which ends it",
+        ];
+        assert_lines(&errors, &wanted);
+    }
+
+    #[test]
+    fn postures_and_joints_go_by_their_names() {
+        let script = "help\naim finger-2-flex-1 20\nposture open\narm\nposture opne\nwait ready\nquit\n";
+        let (_, said, errors) = type_by_hand(Board::new(), script);
+        assert_lines(
+            &said,
+            &["posture NAME|NUMBER|aimed [TIME_S]", "wait NOTICE [TIME_S]", "postures: open, preshape"],
+        );
+        assert_lines(
+            &said,
+            &["aim: done", "posture: refused, the hand is disarmed: arm it first", "arm: done"],
+        );
+        let wanted = [
+            "blindgrasp: the hand has no posture `opne`: did you mean `open`?",
+            "blindgrasp: `ready` is nothing that a hand notices: known: in-posture, touched",
+        ];
+        assert_lines(&errors, &wanted);
     }
 
     /// As in docs/bring-up.md: a sign and the zeros are set, looked at, confirmed and saved, and are there after a reset.
@@ -675,7 +718,7 @@ mod command {
         ];
         assert_lines(&said, &lines);
         let row = said.lines().find(|line| line.starts_with("1     finger-1-flex-1 ")).expect("a row");
-        assert!(row.contains(" 0.450 "), "{row}");
+        assert!(row.contains(" 0.904 "), "{row}");
 
         // Another program, and the same board.
         board.waiting.clear();

@@ -1,8 +1,9 @@
-//! What a hand is told, in words: the same in the script of a scene and on the console.
+//! What a hand is told, and what it tells, in words: the same in the script of a scene and on the console.
 
 use super::error::suggestion;
 use blindgrasp_shared::command::{Command, Grasp, Move};
 use blindgrasp_shared::control::{GAIN_COUNT, GAINS};
+use blindgrasp_shared::cycle::Noticed;
 
 /// A command in words.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -57,6 +58,14 @@ pub struct Names<'a> {
     pub joints: &'a [String],
     /// Of the postures, in the order of the hand's file.
     pub postures: &'a [String],
+}
+
+/// Returns what was noticed, with the fingertip's name if that is known.
+pub fn notice(noticed: &Noticed, fingertips: &[String]) -> String {
+    match noticed.fingertip.and_then(|fingertip| fingertips.get(usize::from(fingertip))) {
+        Some(name) => format!("fingertip `{name}`: {}", noticed.notice.words()),
+        None => noticed.to_string(),
+    }
 }
 
 /// Returns a command with the values that it takes.
@@ -183,6 +192,7 @@ fn milliseconds(word: &str) -> Result<u16, String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use blindgrasp_shared::cycle::Notice;
 
     fn read(line: &str) -> Result<Command, String> {
         let joints: Vec<String> = ["thumb", "wrist"].map(String::from).into();
@@ -203,6 +213,14 @@ mod tests {
         let movement = Move { position_m: [0.0, 0.0, -0.015], time_ms: 800, ..Move::default() };
         assert_eq!(read("move z_mm=-15 time_s=0.8"), Ok(Command::Move(movement)));
         assert_eq!(command("fly", &Names::default()), None);
+    }
+
+    #[test]
+    fn a_fingertip_is_told_by_its_name_if_it_has_one() {
+        let (names, noticed) = (["thumb".to_owned()], Noticed::at(0, Notice::NeverTouched));
+        assert!(notice(&noticed, &names).starts_with("fingertip `thumb`: this fingertip touches nothing"));
+        assert!(notice(&noticed, &[]).starts_with("fingertip 0: "));
+        assert_eq!(notice(&Noticed::of_hand(Notice::Opened), &names), "the grasp is let go");
     }
 
     #[test]

@@ -7,10 +7,12 @@ use blindgrasp::device::interrupt;
 use blindgrasp::device::recorder::{ENDED_ANOTHER, Recorder, Recording};
 use blindgrasp::device::talk::{self, Event, SELDOM, Talk, TalkError, telemetry};
 use blindgrasp::device::transport::{Transport, TransportError};
-use blindgrasp::model::HandModel;
+use blindgrasp::model::order::{self, Names};
+use blindgrasp::model::{HandModel, suggestion};
 use blindgrasp::wire::{Answer, Firmware, Record, Request, label, potentials, scalars, take_encoder};
-use blindgrasp_shared::command::{self, Command, Grasp, Refusal};
-use blindgrasp_shared::control::{GAIN_COUNT, GAINS};
+use blindgrasp_shared::command::{self, Command, Refusal};
+use blindgrasp_shared::control::GAINS;
+use blindgrasp_shared::cycle::{Notice, Noticed};
 use blindgrasp_shared::estimate::Encoder;
 use blindgrasp_shared::identity::Restored;
 use blindgrasp_shared::parameters::{Bound, Each, Parameter, Setting};
@@ -29,16 +31,17 @@ const SLICE: Duration = Duration::from_millis(10);
 const SENDING: Duration = Duration::from_secs(1);
 /// Ticks from one recorded record to the next.
 const EVERY_TICK: u16 = 1;
-/// The commands that can be typed, and their meanings.
-const WORDS: [(&str, &str, &str); 17] = [
+/// Time for which something to be noticed is waited for, if nothing else is said, s: as in the script of a scene.
+const PATIENCE_S: f32 = 10.0;
+/// What can be typed besides the commands of the hand, and its meanings.
+const WORDS: [(&str, &str, &str); 12] = [
     ("help", "", "show this"),
-    ("status", "", "mode, fault, counts, torques, what limits, and what went over the line"),
-    ("arm", "", "let the joints have torque: hold their weight and damp them"),
-    ("disarm", "", "take the torque away"),
-    ("grasp", "", "close the hand and hold; without values, as configured"),
-    ("release", "", "let go slowly"),
-    ("stop", "", "take the torque away at once; so does Ctrl-C, and a second one quits"),
-    ("clear", "", "leave a fault whose cause is gone"),
+    ("status", "", "mode, fault, what is held, counts, torques, what limits, and what went over the line"),
+    (
+        "wait",
+        "NOTICE [TIME_S]",
+        "go on when the hand has noticed this since its last command; it fails after so long (10 s)",
+    ),
     ("get", "[KEY [INDEX]]", "show parameters"),
     ("set", "KEY [INDEX] VALUE", "set a parameter, of all joints or axes without INDEX; disarmed only"),
     ("differs", "", "show the parameters that are other than in the hand's file"),
@@ -108,6 +111,9 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
         period_us: 1000,
         hand: None,
         encoders: Vec::new(),
+        postures: Vec::new(),
+        noticed: Vec::new(),
+        awaited: None,
         unshown: 0,
         differing: None,
         status: Status::Shown,
@@ -202,6 +208,13 @@ enum Status {
     Next,
 }
 
+/// What a line waits for.
+struct Awaited {
+    notice: Notice,
+    time_s: f32,
+    deadline: Instant,
+}
+
 struct Console {
     talk: Talk,
     recorder: Option<Recorder>,
@@ -211,6 +224,12 @@ struct Console {
     period_us: u32,
     /// The hand that the firmware was built with, if it is known.
     hand: Option<HandModel>,
+    /// The names of its postures.
+    postures: Vec<String>,
+    /// What the hand has noticed since its last command.
+    noticed: Vec<Notice>,
+    /// What is waited for before the next line.
+    awaited: Option<Awaited>,
     /// Of a hand that is known, with the signs and zeros in force.
     encoders: Vec<Encoder>,
     /// Answers about them that are not shown.
@@ -282,7 +301,13 @@ impl Console {
                 count => format!("{count} differ from the hand's file"),
             })?;
         }
-        if self.talk.is_idle() && is_ready && self.status == Status::Shown && !self.is_quitting {
+        if let Some(Awaited { notice, time_s, .. }) = self.awaited.take_if(|awaited| now >= awaited.deadline)
+        {
+            eprintln!("blindgrasp: wait: `{}` did not come within {time_s} s", notice.key());
+            self.waited_in_vain(now);
+        }
+        let may_go_on = self.talk.is_idle() && is_ready && self.awaited.is_none();
+        if may_go_on && self.status == Status::Shown && !self.is_quitting {
             match self.typed.lines.pop_front() {
                 Some(line) => {
                     self.typed.number += 1;
@@ -305,6 +330,7 @@ impl Console {
 
     fn stop(&mut self, quit: bool, now: Instant) {
         self.is_quitting |= quit;
+        self.awaited = None;
         self.talk.ask(Request::Command(Command::Stop), now);
     }
 
@@ -321,7 +347,14 @@ impl Console {
     fn not_done(&mut self, request: &Request, answer: Option<&Answer>, now: Instant) {
         let is_shown = matches!(request, Request::GetParameter { .. })
             && answer == Some(&Answer::Refused(Refusal::SwitchedOff));
-        if !self.typed.by_hand && !is_shown && !self.is_quitting {
+        if !is_shown {
+            self.waited_in_vain(now);
+        }
+    }
+
+    /// The same for what the next lines count on.
+    fn waited_in_vain(&mut self, now: Instant) {
+        if !self.typed.by_hand && !self.is_quitting {
             eprintln!("blindgrasp: line {} of the script was not done, which ends it", self.typed.number);
             self.break_off(Broken::Refused, now);
         }
@@ -330,58 +363,98 @@ impl Console {
     fn execute(&mut self, line: &str, now: Instant) -> anyhow::Result<()> {
         let words: Vec<&str> = line.split_whitespace().collect();
         let Some((&word, rest)) = words.split_first() else { return Ok(()) };
-        let command = match (word, rest) {
-            ("arm", []) => Command::Arm,
-            ("disarm", []) => Command::Disarm,
-            ("release", []) => Command::Release,
-            ("stop", []) => Command::Stop,
-            ("clear", []) => Command::ClearFault,
-            ("grasp", values) if values.len() <= GAIN_COUNT => {
-                let mut grasp = Grasp::CONFIGURED;
-                for (gain, value) in grasp.gains.iter_mut().zip(values) {
-                    *gain = Some(number(value)?);
-                }
-                Command::Grasp(grasp)
-            }
+        let joints = self.hand.as_ref().map_or(&[][..], |hand| &hand.joint_names);
+        let names = Names { joints, postures: &self.postures };
+        if let Some(command) = order::command(line, &names) {
+            self.noticed.clear();
+            return self.ask(Request::Command(command.map_err(|error| anyhow!(error))?), now);
+        }
+        match (word, rest) {
             ("help", []) => {
-                for (word, values, words) in WORDS {
-                    say(format_args!("{:<30}  {words}", usage(word, values)))?;
+                let commands = order::WORDS.iter().map(|word| (order::usage(word), word.words));
+                let others = WORDS.iter().map(|&(word, values, words)| (usage(word, values), words));
+                for (usage, words) in commands.chain(others) {
+                    say(format_args!("{usage:<34}  {words}"))?;
                 }
-                return Ok(());
+                let notices: Vec<&str> = Notice::ALL.iter().map(|notice| notice.key()).collect();
+                let lists = [
+                    ("notices", notices.join(", ")),
+                    ("postures", self.postures.join(", ")),
+                    ("joints", joints.join(", ")),
+                ];
+                for (title, names) in lists.iter().filter(|(_, names)| !names.is_empty()) {
+                    say(format_args!("{title}: {names}"))?;
+                }
+                Ok(())
             }
+            ("wait", [notice]) => self.wait(notice, PATIENCE_S, now),
+            ("wait", [notice, time_s]) => self.wait(notice, number(time_s)?, now),
             ("status", []) => {
                 self.status = Status::Asked;
                 self.talk.ask(self.telemetry(), now);
-                return Ok(());
+                Ok(())
             }
             ("quit", []) => {
                 self.stop(true, now);
-                return Ok(());
+                Ok(())
             }
             ("watch", [interval]) => {
                 self.watch(interval)?;
                 self.talk.ask(self.telemetry(), now);
-                return Ok(());
+                Ok(())
             }
-            ("get", []) => return self.get(&Parameter::ALL, None, now),
-            ("get", [key]) => return self.get(&[parameter(key)?], None, now),
-            ("get", [key, index]) => return self.get(&[parameter(key)?], Some(integer(index)?), now),
+            ("get", []) => self.get(&Parameter::ALL, None, now),
+            ("get", [key]) => self.get(&[parameter(key)?], None, now),
+            ("get", [key, index]) => self.get(&[parameter(key)?], Some(integer(index)?), now),
             ("differs", []) => {
                 self.differing = Some(0);
-                return self.get(&Parameter::ALL, None, now);
+                self.get(&Parameter::ALL, None, now)
             }
-            ("zero", []) => return self.ask(Request::Zero { joint: None }, now),
-            ("zero", [joint]) => return self.ask(Request::Zero { joint: Some(integer(joint)?) }, now),
-            ("confirm", []) => return self.ask(Request::Confirm, now),
-            ("save", []) => return self.ask(Request::Save, now),
-            ("defaults", []) => return self.ask(Request::Defaults, now),
-            ("set", [key, value]) => return self.set(parameter(key)?, None, number(value)?, now),
+            ("zero", []) => self.ask(Request::Zero { joint: None }, now),
+            ("zero", [joint]) => self.ask(Request::Zero { joint: Some(integer(joint)?) }, now),
+            ("confirm", []) => self.ask(Request::Confirm, now),
+            ("save", []) => self.ask(Request::Save, now),
+            ("defaults", []) => self.ask(Request::Defaults, now),
+            ("set", [key, value]) => self.set(parameter(key)?, None, number(value)?, now),
             ("set", [key, index, value]) => {
-                return self.set(parameter(key)?, Some(integer(index)?), number(value)?, now);
+                self.set(parameter(key)?, Some(integer(index)?), number(value)?, now)
             }
             _ => bail!(misuse(word)),
+        }
+    }
+
+    /// Waits before the next line until the hand has noticed something, if it has not yet since its last command.
+    fn wait(&mut self, notice: &str, time_s: f32, now: Instant) -> anyhow::Result<()> {
+        let known = Notice::ALL.iter().find(|known| known.key() == notice);
+        let Some(&notice) = known else {
+            let all = Notice::ALL.iter().map(|notice| notice.key());
+            bail!("`{notice}` is nothing that a hand notices: {}", suggestion(notice, all));
         };
-        self.talk.ask(Request::Command(command), now);
+        if !(0.0..=3600.0).contains(&time_s) {
+            bail!("wait: {time_s} s: 0 to 3600 are wanted");
+        }
+        match self.noticed.iter().position(|&noticed| noticed == notice) {
+            Some(at) => drop(self.noticed.remove(at)),
+            None => {
+                let deadline = now + Duration::from_secs_f32(time_s);
+                self.awaited = Some(Awaited { notice, time_s, deadline });
+            }
+        }
+        Ok(())
+    }
+
+    /// Tells what the hand has noticed.
+    fn tell(&mut self, noticed: &Noticed, weight_n: f32) -> anyhow::Result<()> {
+        let fingertips = self.hand.as_ref().map_or(&[][..], |hand| &hand.fingertip_names);
+        let words = order::notice(noticed, fingertips);
+        say(match noticed.notice {
+            Notice::Weighed => format!("{words}: {}", weight(weight_n)),
+            _ => words,
+        })?;
+        match self.awaited.take_if(|awaited| awaited.notice == noticed.notice) {
+            Some(_) => {}
+            None => self.noticed.push(noticed.notice),
+        }
         Ok(())
     }
 
@@ -467,7 +540,13 @@ impl Console {
             }
             Event::Mode(mode) => say(format_args!("mode: {}", mode.words())),
             Event::Fault(None) => say("fault: none any more"),
-            Event::Fault(Some(raised)) => say(format_args!("{raised}; {}", raised.fault.remedy())),
+            Event::Fault(Some(raised)) => {
+                say(format_args!("{raised}; {}", raised.fault.remedy()))?;
+                if self.awaited.take().is_some() {
+                    self.waited_in_vain(now);
+                }
+                Ok(())
+            }
             Event::Answer(Request::Telemetry { .. }, Answer::Done) => {
                 if self.status == Status::Asked {
                     self.status = Status::Next;
@@ -557,6 +636,7 @@ impl Console {
                 None
             }
         };
+        self.postures = self.hand.as_ref().map_or(Vec::new(), HandModel::posture_names);
         let encoders = self.hand.as_ref().map_or(&[][..], |hand| &hand.config.estimator.encoders);
         self.encoders = encoders.to_vec();
         self.unshown = 0;
@@ -589,6 +669,9 @@ impl Console {
     }
 
     fn look(&mut self, record: &Record) -> anyhow::Result<()> {
+        if let Some(noticed) = &record.notice {
+            self.tell(noticed, record.weight_n)?;
+        }
         if self.status == Status::Next {
             self.status = Status::Shown;
             say(self.table(record).trim_end())?;
@@ -638,6 +721,12 @@ impl Console {
         let gains = GAINS.iter().zip(record.gains.iter());
         let gains = gains.map(|(gain, value)| format!("{value} {}", gain.unit)).collect::<Vec<_>>();
         row("grasp", gains.join(", "));
+        if record.mode.is_grasp() {
+            row("held", held(record));
+        }
+        if record.weight_n != 0.0 {
+            row("weighed", weight(record.weight_n));
+        }
         let energies =
             scalars(record).into_iter().skip(potentials().end).filter(|(signal, _)| signal.unit == "J");
         let energies = energies.map(|(signal, value)| format!("{} {value:.6} J", label(&signal)));
@@ -664,6 +753,24 @@ impl Console {
         }
         text
     }
+}
+
+/// Returns the way and the turn of what is held since the grasp began, as `move` has them.
+fn held(record: &Record) -> String {
+    let [x_m, y_m, z_m, turn @ ..] = record.law_signals.frame;
+    // Axis times sine of half the angle.
+    let sine = turn.iter().map(|v| v * v).sum::<f32>().sqrt();
+    let turn_deg = 2.0 * sine.min(1.0).asin().to_degrees();
+    // No -0.0 is shown.
+    let tenths = |value: f32| (10.0 * value).round() / 10.0 + 0.0;
+    let [turn_x, turn_y, turn_z] = turn.map(|v| if sine > 0.0 { tenths(v / sine * turn_deg) } else { 0.0 });
+    let [x_mm, y_mm, z_mm] = [x_m, y_m, z_m].map(|m| tenths(1e3 * m));
+    format!("x_mm={x_mm} y_mm={y_mm} z_mm={z_mm} turn_x_deg={turn_x} turn_y_deg={turn_y} turn_z_deg={turn_z}")
+}
+
+/// Returns a weight in words, and the mass that has it.
+fn weight(weight_n: f32) -> String {
+    format!("{weight_n:.3} N ({:.0} g)", weight_n / 9.81 * 1e3)
 }
 
 /// Prints a line.
@@ -736,15 +843,8 @@ fn integer(word: &str) -> anyhow::Result<u8> {
     word.parse().with_context(|| format!("`{word}` is not an index from 0 to 255"))
 }
 
-/// Returns a command with the values that it takes. Those of `grasp` are the gains of the laws.
+/// Returns a word with the values that it takes.
 fn usage(word: &str, values: &str) -> String {
-    let values = match word {
-        "grasp" => GAINS.iter().rev().fold(String::new(), |inner, gain| {
-            let separator = if inner.is_empty() { "" } else { " " };
-            format!("[{}{separator}{inner}]", gain.key.to_uppercase())
-        }),
-        _ => values.to_owned(),
-    };
     format!("{word} {values}").trim_end().to_owned()
 }
 
@@ -753,7 +853,7 @@ fn misuse(word: &str) -> String {
     if let Some((word, values, words)) = WORDS.iter().find(|(known, ..)| *known == word) {
         return format!("use: {}: {words}", usage(word, values));
     }
-    let known = WORDS.iter().map(|&(known, ..)| known);
+    let known = order::WORDS.iter().map(|known| known.word).chain(WORDS.iter().map(|&(known, ..)| known));
     format!("`{word}` is not a command: {}", similar(word, known).unwrap_or("type `help` for all".to_owned()))
 }
 
