@@ -47,13 +47,7 @@ const FRAME: [&str; 2] = ["control.frame_stiffness_n_m=300", "control.frame_turn
 fn what_is_held_goes_where_it_is_asked_to() {
     for name in ["cube-ideal", "prism-ideal"] {
         let told = |correction: &str| {
-            let settings = [
-                FRAME[0],
-                FRAME[1],
-                correction,
-                "duration_s=20",
-                "control.carrying_integral_n=0",
-            ];
+            let settings = [FRAME[0], FRAME[1], correction, "duration_s=20", "control.carrying_integral_n=0"];
             let movement = ("move x_mm=20 turn_z_deg=20 time_s=2", Some("holding"), 3.0);
             let scene = scene(name, &settings, &[("grasp", None, 0.0), movement]);
             let (mut first, mut last) = (None, None);

@@ -8,6 +8,7 @@
 mod exchange;
 pub mod history;
 pub mod input;
+pub mod jog;
 pub mod live;
 pub mod model;
 pub mod playback;

@@ -11,7 +11,7 @@ use blindgrasp_device::talk::{self, Event, LineError, Talk, TalkError};
 use blindgrasp_device::transport::{self, Transport, TransportError};
 use blindgrasp_model::HandModel;
 use blindgrasp_record::mcap::RecordingError;
-use blindgrasp_shared::command::{self, Command, Refusal};
+use blindgrasp_shared::command::{self, Command, Move, Refusal};
 use blindgrasp_shared::link::message::Signals;
 use blindgrasp_shared::link::rate::Wanted;
 use blindgrasp_shared::parameters::Parameter;
@@ -40,6 +40,8 @@ pub enum Told {
     News(Duration, News),
     /// The result of a stop: `true` if the hand has confirmed it.
     Stopped(bool),
+    /// The result of a movement of what is held: `true` if the hand has taken it.
+    Moved(Move, bool),
     /// The recording has ended too early.
     Unrecorded(RecordingError),
 }
@@ -338,6 +340,13 @@ impl Follower {
                     Answer::Refused(refusal) => Some(*refusal),
                     _ => None,
                 };
+                if let Command::Move(to) = command {
+                    self.send(Told::Moved(to, refused.is_none()));
+                    if refused.is_none() {
+                        // One a key would hide everything else.
+                        return;
+                    }
+                }
                 let level = if refused.is_some() { Level::Warning } else { Level::Info };
                 self.note(level, command::Answer { command, refused }.to_string());
                 if command == Command::Stop {

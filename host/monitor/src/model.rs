@@ -5,9 +5,10 @@
 
 use super::history::{History, Range};
 use super::rate::Rate;
-use blindgrasp_model::HandModel;
+use blindgrasp_model::{HandModel, order};
 use blindgrasp_shared::command::{Command, Refusal};
 use blindgrasp_shared::control::Signal;
+use blindgrasp_shared::cycle;
 use blindgrasp_shared::estimate::Encoder;
 use blindgrasp_shared::event;
 use blindgrasp_shared::limit::Limiting;
@@ -333,6 +334,15 @@ impl Model {
         }
         self.number(record.sequence);
         self.remember_counts(&record);
+        if let Some(noticed) = &record.notice {
+            let fingertips = self.hand().map_or(&[][..], |hand| &hand.fingertip_names);
+            let words = order::notice(noticed, fingertips);
+            let words = match noticed.notice {
+                cycle::Notice::Weighed => format!("{words}: {:.3} N", record.weight_n),
+                _ => words,
+            };
+            self.note(at, Level::Info, words);
+        }
         self.record = Some((at, record));
         self.remember(at);
     }

@@ -1,9 +1,13 @@
 //! A hand that is simulated, with the firmware's own code for its controller: a tick at a time, for as long as anybody
 //! likes.
 //!
-//! The world begins with the first grasp: until then everything stands still, as the scene puts it. When the hand has lost
-//! the object, or has no grasp any more, the joints glide back to where they began, as if somebody opened the hand and put
-//! the object back; the next grasp begins there.
+//! Where the fingertips touch the object from the start, the world begins with the first grasp: until then everything stands still,
+//! as the scene puts it. When the hand has lost the object, or has no grasp any more, the joints glide back to where they began, as
+//! if somebody opened the hand and put the object back; the next grasp begins there.
+//!
+//! Where the hand begins open, the world runs as long as the hand is armed, or in a fault: what it drops stays where it falls. Once it
+//! is disarmed, everything is put back. Whoever drives such a hand takes his time, so that nothing happens at a time of the scene:
+//! its tables stay where they are.
 
 use super::pil::{PilError, Plan};
 use blindgrasp_body::dynamics::JointVector;
@@ -46,9 +50,11 @@ pub enum SimulatedError {
 pub enum Happening {
     /// A grasp began.
     Grasped,
-    /// The object was lost.
+    /// The object was lost, and is put back.
     Lost(Lost),
-    /// There is no grasp any more.
+    /// The object was lost, and stays where it is.
+    Dropped(Lost),
+    /// There is no grasp any more, or the hand is disarmed: everything is put back.
     LetGo,
     /// Everything is as it was at the start.
     PutBack,
@@ -72,18 +78,19 @@ pub struct Turn {
 enum World {
     /// At the start.
     Still,
-    /// In a grasp.
-    Grasp(Box<Held>),
+    /// Everything moves.
+    Running(Box<Running>),
     /// On the way back, for so many ticks.
     PutBack { from_rad: JointVector, ticks: u64 },
 }
 
-/// The object that is held.
+/// A world that runs.
 #[derive(Clone, Debug)]
-struct Held {
+struct Running {
     plant: Plant,
     motors: Motors,
-    judge: Judge,
+    /// None once the object is lost.
+    judge: Option<Judge>,
     /// For so many ticks.
     ticks: u64,
 }
@@ -95,15 +102,17 @@ pub struct SimulatedHand {
     device: Device<MAX_JOINTS, MAX_FINGERS>,
     burst: Box<Burst<MAX_JOINTS>>,
     encoders: Encoders,
-    /// Before a grasp.
+    /// At the start.
     plant: Plant,
     motors: Motors,
     delay: Delay,
     world: World,
-    /// `true` if the next grasp is a new one.
+    /// `true` if the hand begins open.
+    begins_open: bool,
+    /// `true` if the next grasp, or arming, is a new one.
     ready: bool,
     period_s: f64,
-    /// The time at which an encoder fails, ticks after each grasp.
+    /// The time at which an encoder fails, ticks after the world has begun to run.
     failure: Option<u64>,
 }
 
@@ -134,6 +143,12 @@ impl SimulatedHand {
         // From the fastest on.
         let slower = FASTER_BAUDS.iter().position(|&faster| baud == 0 || faster <= baud);
         let faster_bauds = slower.map_or(&[][..], |first| &FASTER_BAUDS[first..]);
+        let begins_open = begins_open(scene);
+        let mut scene = scene.clone();
+        if begins_open {
+            leave_out_times(&mut scene);
+        }
+        let scene = &scene;
         Ok(Self {
             device: Device::new(params, identity).with_faster_bauds(faster_bauds),
             burst: Box::new(Burst::new()),
@@ -142,6 +157,7 @@ impl SimulatedHand {
             motors: Motors::new(scene),
             delay: Delay::new(scene.actuators.output_delay_ticks, [0.0; MAX_JOINTS]),
             world: World::Still,
+            begins_open,
             ready: true,
             period_s: scene.control.period_s,
             failure: None,
@@ -149,9 +165,10 @@ impl SimulatedHand {
         })
     }
 
-    /// Lets the first joint's encoder fail for a tenth of a second, so many seconds after each grasp.
-    pub fn fail_after(&mut self, grasp_s: f64) {
-        self.failure = Some((grasp_s / self.period_s).round() as u64);
+    /// Lets the first joint's encoder fail for a tenth of a second, so many seconds after each grasp, or arming where the hand
+    /// begins open.
+    pub fn fail_after(&mut self, after_s: f64) {
+        self.failure = Some((after_s / self.period_s).round() as u64);
     }
 
     /// One tick.
@@ -170,15 +187,15 @@ impl SimulatedHand {
     }
 
     fn read(&mut self) -> Reading<MAX_JOINTS> {
-        if let (World::Grasp(held), Some(begin)) = (&self.world, self.failure)
-            && (begin..begin + self.ticks(FAILURE_S)).contains(&held.ticks)
+        if let (World::Running(running), Some(begin)) = (&self.world, self.failure)
+            && (begin..begin + self.ticks(FAILURE_S)).contains(&running.ticks)
         {
             return Reading::Failed(Raised::at(0, Fault::SampleMissing));
         }
         let start_rad = &self.plant.motion().angles_rad;
         let angles_rad = match &self.world {
             World::Still => *start_rad,
-            World::Grasp(held) => held.plant.motion().angles_rad,
+            World::Running(running) => running.plant.motion().angles_rad,
             World::PutBack { from_rad, ticks } => {
                 // As smooth as a hand that is moved by hand.
                 let share = (*ticks as f64 * self.period_s / PUT_BACK_S).min(1.0);
@@ -192,23 +209,26 @@ impl SimulatedHand {
     /// Moves the world on under these torques until the next tick.
     fn move_on(&mut self, mode: Mode, wanted_nm: &[f32; MAX_JOINTS]) -> Option<Happening> {
         let put_back = self.ticks(PUT_BACK_S);
-        let grasps = matches!(mode, Mode::Grasping | Mode::Releasing);
-        self.ready |= !grasps;
+        let runs = match self.begins_open {
+            true => mode != Mode::Disarmed,
+            false => mode.is_grasp() || mode == Mode::Closing,
+        };
+        self.ready |= !runs;
         match &mut self.world {
-            World::Still if grasps && self.ready => {
+            World::Still if runs && self.ready => {
                 self.ready = false;
                 let (plant, motors) = (self.plant.clone(), self.motors.clone());
-                let judge = Judge::new(self.period_s);
-                self.world = World::Grasp(Box::new(Held { plant, motors, judge, ticks: 0 }));
+                let judge = Some(Judge::new(self.period_s));
+                self.world = World::Running(Box::new(Running { plant, motors, judge, ticks: 0 }));
                 // What goes wrong in the very first tick is found in the next.
-                self.grasp(mode, wanted_nm).or(Some(Happening::Grasped))
+                self.run(mode, wanted_nm).or((!self.begins_open).then_some(Happening::Grasped))
             }
             World::Still => None,
-            World::Grasp(held) if !grasps => {
-                self.world = World::PutBack { from_rad: held.plant.motion().angles_rad, ticks: 0 };
+            World::Running(running) if !runs => {
+                self.world = World::PutBack { from_rad: running.plant.motion().angles_rad, ticks: 0 };
                 Some(Happening::LetGo)
             }
-            World::Grasp(_) => self.grasp(mode, wanted_nm),
+            World::Running(_) => self.run(mode, wanted_nm),
             World::PutBack { ticks, .. } => {
                 *ticks += 1;
                 (*ticks > put_back).then(|| {
@@ -219,15 +239,31 @@ impl SimulatedHand {
         }
     }
 
-    fn grasp(&mut self, mode: Mode, wanted_nm: &[f32; MAX_JOINTS]) -> Option<Happening> {
-        let World::Grasp(held) = &mut self.world else { return None };
-        let Held { plant, motors, judge, ticks } = &mut **held;
+    fn run(&mut self, mode: Mode, wanted_nm: &[f32; MAX_JOINTS]) -> Option<Happening> {
+        let World::Running(running) = &mut self.world else { return None };
+        let Running { plant, motors, judge, ticks } = &mut **running;
         *ticks += 1;
         let mut gone = None;
-        let moved = motors.turn(plant, wanted_nm, |plant, _| gone = judge.see(plant, mode));
-        let lost = moved.err().map(|(_, lost)| lost).or(gone)?;
-        self.world = World::PutBack { from_rad: plant.motion().angles_rad, ticks: 0 };
-        Some(Happening::Lost(lost))
+        let moved = motors.turn(plant, wanted_nm, |plant, _| {
+            gone = judge.as_mut().and_then(|judge| judge.see(plant, mode));
+        });
+        match moved {
+            Ok(()) if self.begins_open => {
+                let lost = gone?;
+                *judge = None;
+                Some(Happening::Dropped(lost))
+            }
+            Ok(()) => gone.map(|lost| self.put_back(lost)),
+            // It can't be computed any further.
+            Err((_, lost)) => Some(self.put_back(lost)),
+        }
+    }
+
+    fn put_back(&mut self, lost: Lost) -> Happening {
+        if let World::Running(running) = &self.world {
+            self.world = World::PutBack { from_rad: running.plant.motion().angles_rad, ticks: 0 };
+        }
+        Happening::Lost(lost)
     }
 
     fn ticks(&self, time_s: f64) -> u64 {
@@ -235,10 +271,25 @@ impl SimulatedHand {
     }
 }
 
+/// Returns `true` if no fingertip touches the object at the start.
+pub fn begins_open(scene: &Scene) -> bool {
+    scene.contacts.is_empty()
+}
+
+/// Leaves out all that happens at a time since the scene began.
+fn leave_out_times(scene: &mut Scene) {
+    let plant = &mut scene.plant;
+    plant.tables.iter_mut().for_each(|table| table.moves.clear());
+    plant.turns.clear();
+    plant.shakes.clear();
+    plant.pushes.clear();
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
-    use blindgrasp_shared::command::{Command, Grasp};
+    use blindgrasp_shared::command::{Command, Grasp, Move};
+    use blindgrasp_shared::cycle::Notice;
     use blindgrasp_wire::Request;
 
     struct Bench {
@@ -250,8 +301,12 @@ mod tests {
 
     impl Bench {
         fn new(settings: &[&str]) -> Self {
+            Self::of("cube", settings)
+        }
+
+        fn of(scene: &str, settings: &[&str]) -> Self {
             let settings: Vec<String> = settings.iter().map(|&setting| setting.to_owned()).collect();
-            let hand = SimulatedHand::new(&Scene::load("cube", &settings).unwrap(), 0).unwrap();
+            let hand = SimulatedHand::new(&Scene::load(scene, &settings).unwrap(), 0).unwrap();
             let mut bench = Self { hand, sequence: 0, happened: Vec::new(), counts: Vec::new() };
             bench.ask(Request::Hello { interface_version: INTERFACE_VERSION });
             bench
@@ -304,6 +359,61 @@ mod tests {
             assert_eq!(bench.counts, start);
             assert_eq!(bench.command(Command::Arm), Mode::Armed);
         }
+    }
+
+    /// Runs until a notice comes.
+    fn until(bench: &mut Bench, notice: Notice) {
+        for k in 0..10_000 {
+            let packet = (k % 50 == 0).then(|| {
+                bench.sequence += 1;
+                Packet { session: 1, sequence: bench.sequence, request: Request::Heartbeat }
+            });
+            let (outputs, happened) = bench.hand.turn(Turn { packet, ..Turn::default() });
+            bench.happened.extend(happened);
+            bench.counts = outputs.record.counts.as_slice().to_vec();
+            if outputs.record.notice.is_some_and(|noticed| noticed.notice == notice) {
+                return;
+            }
+        }
+        panic!("{notice:?} does not come: {:?}", bench.happened);
+    }
+
+    /// The cube of `pick-cube` is picked up and put down, with all the time that the user takes: its table stays.
+    #[test]
+    fn an_open_hand_picks_up_what_lies_before_it_until_it_is_disarmed() {
+        let mut bench = Bench::of("pick-cube", &[]);
+        bench.run(100);
+        let start = bench.counts.clone();
+        let preshape = Command::Posture { posture: Some(1), time_ms: 0 };
+        bench.command(Command::Arm);
+        bench.run(5000);
+        bench.command(preshape);
+        until(&mut bench, Notice::InPosture);
+        assert_ne!(bench.counts, start);
+        bench.command(Command::Grasp(Grasp::CONFIGURED));
+        until(&mut bench, Notice::Holding);
+        bench.command(Command::Move(Move { position_m: [0.0, 0.0, -0.015], ..Move::default() }));
+        until(&mut bench, Notice::AtTarget);
+        bench.run(10_000);
+        bench.command(Command::PutDown);
+        until(&mut bench, Notice::OnGround);
+        bench.command(Command::Release);
+        until(&mut bench, Notice::InPosture);
+        assert_eq!(bench.happened, []);
+        // Let go from up there, it falls, and stays there.
+        bench.command(preshape);
+        until(&mut bench, Notice::InPosture);
+        bench.command(Command::Grasp(Grasp::CONFIGURED));
+        until(&mut bench, Notice::Holding);
+        bench.command(Command::Move(Move { position_m: [0.0, 0.0, -0.04], ..Move::default() }));
+        until(&mut bench, Notice::AtTarget);
+        bench.command(Command::Release);
+        bench.run(2000);
+        assert!(matches!(bench.happened[..], [Happening::Dropped(_)]), "{:?}", bench.happened);
+        bench.command(Command::Disarm);
+        bench.run(1100);
+        assert!(matches!(bench.happened[1..], [Happening::LetGo, Happening::PutBack]));
+        assert_eq!(bench.counts, start);
     }
 
     /// The device's own estimator undoes what the encoders do.

@@ -9,8 +9,8 @@ use blindgrasp::device::talk::{self, Event, SELDOM, Talk, TalkError, telemetry};
 use blindgrasp::device::transport::{Transport, TransportError};
 use blindgrasp::model::order::{self, Names};
 use blindgrasp::model::{HandModel, suggestion};
-use blindgrasp::wire::{Answer, Firmware, Record, Request, label, potentials, scalars, take_encoder};
-use blindgrasp_shared::command::{self, Command, Refusal};
+use blindgrasp::wire::{self, Answer, Firmware, Record, Request, label, potentials, scalars, take_encoder};
+use blindgrasp_shared::command::{self, Command, Move, Refusal};
 use blindgrasp_shared::control::GAINS;
 use blindgrasp_shared::cycle::{Notice, Noticed};
 use blindgrasp_shared::estimate::Encoder;
@@ -755,16 +755,13 @@ impl Console {
     }
 }
 
-/// Returns the way and the turn of what is held since the grasp began, as `move` has them.
+/// Returns the way and the turn of what is held since the grasp began, in the words of `move`.
 fn held(record: &Record) -> String {
-    let [x_m, y_m, z_m, turn @ ..] = record.law_signals.frame;
-    // Axis times sine of half the angle.
-    let sine = turn.iter().map(|v| v * v).sum::<f32>().sqrt();
-    let turn_deg = 2.0 * sine.min(1.0).asin().to_degrees();
+    let Move { position_m, turn_rad, .. } = wire::held(record);
     // No -0.0 is shown.
     let tenths = |value: f32| (10.0 * value).round() / 10.0 + 0.0;
-    let [turn_x, turn_y, turn_z] = turn.map(|v| if sine > 0.0 { tenths(v / sine * turn_deg) } else { 0.0 });
-    let [x_mm, y_mm, z_mm] = [x_m, y_m, z_m].map(|m| tenths(1e3 * m));
+    let [x_mm, y_mm, z_mm] = position_m.map(|m| tenths(1e3 * m));
+    let [turn_x, turn_y, turn_z] = turn_rad.map(|rad| tenths(rad.to_degrees()));
     format!("x_mm={x_mm} y_mm={y_mm} z_mm={z_mm} turn_x_deg={turn_x} turn_y_deg={turn_y} turn_z_deg={turn_z}")
 }
 

@@ -5,13 +5,15 @@ use anyhow::{Context, bail};
 use blindgrasp::device::interrupt;
 use blindgrasp::device::recorder::Recording;
 use blindgrasp::device::transport::ports_in_words;
+use blindgrasp::model::HandModel;
 use blindgrasp::monitor::input::{Input, Intent, Situation};
+use blindgrasp::monitor::jog::Jog;
 use blindgrasp::monitor::live::{Live, Told};
-use blindgrasp::monitor::model::{Link, Model, Plot};
+use blindgrasp::monitor::model::{Level, Link, Model, News, Plot};
 use blindgrasp::monitor::playback::Playback;
 use blindgrasp::monitor::view::{self, Palette, Screen, Source};
 use blindgrasp::record::mcap::RecordingError;
-use blindgrasp_shared::command::Command;
+use blindgrasp_shared::command::{Command, Refusal};
 use clap::Args;
 use ratatui::DefaultTerminal;
 use ratatui::crossterm::event::{self, Event, KeyEventKind};
@@ -35,7 +37,7 @@ const WINDOWS_S: [u64; 3] = [5, 20, 60];
 /// Watch a hand in a terminal, and command it; or play a recording back
 ///
 /// Shows mode, fault, what limits, refusals in words, the heartbeat that is left, the link's health, a bar for each joint and
-/// plots. Keys arm, grasp, release, disarm and stop; `?` lists them. What can move or drop something is asked about first; a
+/// plots. Keys arm, grasp, move what is held, put it down, release, disarm and stop; `?` lists them. What can move or drop something is asked about first; a
 /// stop (space) never is. Ctrl-C stops the hand, a second one ends the program.
 ///
 /// Exit code 0: ended, and a stop that was wanted is confirmed; 2: bad usage, no such port or file, the stop is not confirmed,
@@ -216,6 +218,7 @@ fn wait_for_stop(live: &Live) -> bool {
 struct Monitor {
     input: Input,
     situation: Situation,
+    jog: Jog,
     /// Signals that were seen.
     signals: u32,
     /// The reason for which the recording has ended too early, if it has.
@@ -233,6 +236,7 @@ impl Monitor {
         let coloured = std::env::var_os("NO_COLOR").is_none_or(|value| value.is_empty());
         Self {
             input: Input::default(),
+            jog: Jog::default(),
             situation: Situation { is_live: true, is_heard: false, mode: None },
             signals: interrupt::count(),
             unrecorded: None,
@@ -258,7 +262,13 @@ impl Monitor {
             let told = live.fetch().context("the thread of the line has ended")?;
             for told in told {
                 match told {
-                    Told::News(at, news) => model.take(at, news),
+                    Told::News(at, news) => {
+                        if let News::Record(record) = &news {
+                            self.jog.see(record);
+                        }
+                        model.take(at, news);
+                    }
+                    Told::Moved(to, is_taken) => self.jog.answered(to, is_taken),
                     Told::Stopped(is_confirmed) if stopping.is_some() => {
                         return Ok(Ended::Stopped(is_confirmed));
                     }
@@ -283,6 +293,15 @@ impl Monitor {
             };
             match intent {
                 Some(Intent::Ask(command)) => live.ask(command),
+                Some(Intent::Jog(step)) => {
+                    if let Some(record) = model.record() {
+                        live.ask(Command::Move(self.jog.step(step, record)));
+                    }
+                }
+                Some(Intent::NothingHeld) => {
+                    let words = format!("move: {}", Refusal::NotCarrying.words());
+                    model.take(live.now(), News::Notice(Level::Warning, words));
+                }
                 Some(Intent::Quit) => return Ok(Ended::LetGo),
                 Some(Intent::StopAndQuit) => {
                     live.ask(Command::Stop);
@@ -350,13 +369,16 @@ impl Monitor {
         now: Duration,
     ) -> anyhow::Result<()> {
         self.input.turn(now);
+        let postures = model.hand().map_or(Vec::new(), HandModel::posture_names);
+        let question = self.input.question(now, &postures);
         let screen = Screen {
             source,
             plot: Plot::all()[self.plot],
             window_s: WINDOWS_S[self.window],
             joint: self.joint,
             help: self.help,
-            question: self.input.question(now),
+            question: question.as_ref().map(|(words, left_s)| (words.as_ref(), *left_s)),
+            is_jogging: self.input.is_jogging(self.situation),
             palette: self.palette,
         };
         let drawn = terminal.draw(|frame| view::draw(frame, model, &screen, now));

@@ -8,7 +8,7 @@ use blindgrasp::model::Scene;
 use blindgrasp::rig::line::Line;
 use blindgrasp::rig::pty::{Link, Pty};
 use blindgrasp::rig::serve::{News, Served, serve};
-use blindgrasp::rig::simulated::{Happening, SimulatedHand};
+use blindgrasp::rig::simulated::{Happening, SimulatedHand, begins_open};
 use blindgrasp_shared::link::rate::FIRST_BAUD;
 use clap::Args;
 use std::ffi::OsString;
@@ -21,6 +21,9 @@ use std::path::PathBuf;
 /// firmware's own code, with the parameters of the scene and its plant. Everything stands still until the first grasp; when
 /// the object is lost, or let go, it is put back within a second. Ctrl-C ends it.
 ///
+/// Where the hand begins open, as in `pick-cube`, everything moves from `arm` on, and is put back when the hand is disarmed. You
+/// drive: the scene's script is not run, and its tables stay where they are.
+///
 /// Exit code 0: ended by the user; 2: bad input or usage.
 #[derive(Args)]
 pub(crate) struct Arguments {
@@ -32,7 +35,7 @@ pub(crate) struct Arguments {
     /// Speed of the line to the host; 0 for one that is as fast as the host
     #[arg(long, value_name = "BAUD", default_value_t = FIRST_BAUD)]
     baud: u32,
-    /// Let the first joint's encoder fail for 0.1 s, so many seconds after each grasp
+    /// Let the first joint's encoder fail for 0.1 s, so many seconds after each grasp, or after `arm` where the hand begins open
     #[arg(long, value_name = "S", value_parser = seconds)]
     fail_after: Option<f64>,
     /// Change a value of the scene, such as control.force_n=4 (may be repeated)
@@ -62,6 +65,11 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
     if let Some(after_s) = arguments.fail_after {
         hand.fail_after(after_s);
     }
+    if begins_open(&scene) {
+        eprintln!(
+            "blindgrasp: you drive: the scene's script is not run, and nothing happens by itself at a time of the scene, such as a table that goes away"
+        );
+    }
     let mut pty = Pty::open().context("there is no pseudo-terminal")?;
     let port = pty.port().to_owned();
     let made = |path: &PathBuf| {
@@ -84,7 +92,10 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
         let words = match news {
             News::World(Happening::Grasped) => "a grasp begins".to_owned(),
             News::World(Happening::Lost(lost)) => format!("the object is lost: {lost}; it is put back"),
-            News::World(Happening::LetGo) => "the object is let go; it is put back".to_owned(),
+            News::World(Happening::Dropped(lost)) => {
+                format!("the object is lost: {lost}; it is put back when the hand is disarmed")
+            }
+            News::World(Happening::LetGo) => "it is let go; everything is put back".to_owned(),
             News::World(Happening::PutBack) => "the object is back".to_owned(),
             News::Missed(ticks) => format!("this program stood still: {ticks} ticks are missed"),
         };

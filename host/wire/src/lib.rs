@@ -1,7 +1,7 @@
 //! The wire, as the host has it: the messages of a hand of any size, and what they say.
 
 use blindgrasp_body::MAX_JOINTS;
-use blindgrasp_shared::command::Refusal;
+use blindgrasp_shared::command::{Move, Refusal};
 use blindgrasp_shared::control::{GAIN_COUNT, Signal};
 use blindgrasp_shared::estimate::Encoder;
 use blindgrasp_shared::identity::{BrownOut, Clock, Crash, Identity, ResetCause, Restored};
@@ -164,6 +164,19 @@ pub fn scalars(record: &Record) -> Vec<(Signal, f32)> {
         _ => {}
     });
     scalars
+}
+
+/// Returns the way and the turn of what is held since the grasp began, as a command would ask for them.
+pub fn held(record: &Record) -> Move {
+    let [x_m, y_m, z_m, turn @ ..] = record.law_signals.frame;
+    Move { position_m: [x_m, y_m, z_m], turn_rad: rotation_vector_rad(turn), ..Move::default() }
+}
+
+/// Returns the rotation vector, rad, of an axis times the sine of half the angle.
+pub fn rotation_vector_rad(axis_sine: [f32; 3]) -> [f32; 3] {
+    let sine = axis_sine.iter().map(|v| v * v).sum::<f32>().sqrt();
+    let per_sine = if sine > 0.0 { 2.0 * sine.min(1.0).asin() / sine } else { 2.0 };
+    axis_sine.map(|v| v * per_sine)
 }
 
 /// The scalars that are potentials of the laws: behind their gains.

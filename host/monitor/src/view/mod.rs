@@ -69,6 +69,8 @@ pub struct Screen<'s> {
     pub help: bool,
     /// The question, and how long it waits for an answer, s.
     pub question: Option<(&'s str, u64)>,
+    /// `true` while keys move what is held.
+    pub is_jogging: bool,
     /// Colours.
     pub palette: Palette,
 }
@@ -150,6 +152,10 @@ fn foot<'s>(screen: &Screen<'s>, now: Duration) -> Line<'s> {
         return Line::styled(format!("{words}  ({left_s} s)"), screen.palette.selected());
     }
     match screen.source {
+        Source::Port { .. } if screen.is_jogging => {
+            let words = "JOG  x y z: 1 mm along, u v w: 1 degree about; capitals: back  Esc: end  space STOP";
+            Line::styled(words, screen.palette.selected())
+        }
         Source::Port { .. } => {
             Line::raw("a arm  d disarm  g grasp  r release  space STOP  c clear fault  q quit  ? help")
         }
@@ -167,9 +173,13 @@ fn foot<'s>(screen: &Screen<'s>, now: Duration) -> Line<'s> {
     }
 }
 
-const LIVE_KEYS: [&str; 12] = [
+const LIVE_KEYS: [&str; 16] = [
     "a            arm (asks first)",
+    "p            move to a posture (asks which)",
     "g            grasp (asks first)",
+    "j            move what is held by keys (asks first): a step a key",
+    "k            weigh it (asks first)",
+    "l            put it down (asks first)",
     "r            release (asks first)",
     "d            disarm (asks first if something may be held)",
     "space, s     STOP at once: no torque, what is held falls",

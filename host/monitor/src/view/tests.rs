@@ -21,6 +21,7 @@ const SCREEN: Screen<'static> = Screen {
     joint: None,
     help: false,
     question: None,
+    is_jogging: false,
     palette: Palette { coloured: true },
 };
 
