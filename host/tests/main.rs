@@ -20,6 +20,7 @@ mod monitor;
 #[cfg(feature = "paper")]
 mod paper;
 mod patient;
+mod pick_up;
 mod pil;
 mod python_client;
 mod python_sweep;
