@@ -351,6 +351,7 @@ mod monitor {
             was_shown |= model.record().is_some();
             let joints = model.joint_count();
             let screen = Screen {
+                is_jogging: false,
                 source: Source::Port { port, saved: None },
                 plot: Plot::all()[random.usize(0..Plot::all().len())],
                 window_s: [5, 20, 60][random.usize(0..3)],
