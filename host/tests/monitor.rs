@@ -38,10 +38,14 @@ impl Hand {
     }
 
     fn serve_with(folder: &TempDir, arguments: &[&str]) -> Self {
-        let port = folder.path().join("hand");
-        let _ = std::fs::remove_file(&port);
         let is_patient = std::env::var_os("BLINDGRASP_BLESS").is_none();
         let scene = if is_patient { patient::scene(folder, 1000) } else { "cube".into() };
+        Self::serve_scene(folder, &scene, arguments)
+    }
+
+    fn serve_scene(folder: &TempDir, scene: &Path, arguments: &[&str]) -> Self {
+        let port = folder.path().join("hand");
+        let _ = std::fs::remove_file(&port);
         let mut child = Command::new(BLINDGRASP)
             .arg("serve")
             .arg(scene)
@@ -260,6 +264,40 @@ fn keys_arm_grasp_and_stop_and_ask_before_what_moves() {
     // A stop asks nothing, not even while there is a question.
     terminal.press("r");
     terminal.wait_for_text("RELEASE: what is held is let go.");
+    terminal.press(" ");
+    terminal.wait_for_mode("DISARMED");
+    terminal.press("q");
+    let (status, _) = terminal.ended();
+    assert_eq!(status.code(), Some(0));
+}
+
+#[test]
+fn keys_pick_a_cube_up_move_it_and_put_it_down() {
+    let folder = folder();
+    let hand = Hand::serve_scene(&folder, Path::new("pick-cube"), &[]);
+    let terminal = Terminal::watching(&hand);
+    terminal.press("j");
+    terminal.wait_for_text("! move: nothing is held firmly");
+    terminal.press("ayp");
+    terminal.wait_for_text("POSTURE: the fingers move. 1 open 2 preshape Esc: don't");
+    terminal.press("2");
+    terminal.wait_for_mode("MOVING");
+    terminal.press("gy");
+    terminal.wait_for_mode("CARRYING");
+    terminal.press("j");
+    terminal.wait_for_text("JOG: keys move what is held.");
+    terminal.press("\rZZZZZZZZw");
+    terminal.wait_for_text("JOG x y z: 1 mm along");
+    terminal.wait_for_text("the target is where it was to go");
+    terminal.press("\x1b");
+    terminal.wait_for("no jog", |screen| !screen.contains("JOG"));
+    terminal.press("l");
+    terminal.wait_for_text("PUT DOWN: what is held sinks until it stands.");
+    terminal.press("y");
+    terminal.wait_for_mode("PUTTING DOWN");
+    terminal.wait_for_mode("CARRYING");
+    terminal.press("ry");
+    terminal.wait_for_mode("MOVING");
     terminal.press(" ");
     terminal.wait_for_mode("DISARMED");
     terminal.press("q");

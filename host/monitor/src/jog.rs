@@ -80,6 +80,7 @@ impl Jog {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use blindgrasp_shared::math::Real as _;
 
     fn record(mode: Mode, z_m: f32) -> Record {
         let mut record = Record { mode, ..Record::BLANK };
@@ -106,7 +107,7 @@ mod tests {
             target = step('w').from(&target);
         }
         target = step('u').from(&target);
-        let angle_deg = target.turn_rad.iter().map(|v| v * v).sum::<f32>().sqrt().to_degrees();
+        let angle_deg = target.turn_rad.iter().map(|v| v * v).sum::<f32>().square_root().to_degrees();
         assert!((angle_deg - 90.0).abs() < 0.02, "{angle_deg}");
         assert!(target.turn_rad[0] > 0.0 && target.turn_rad[1] < 0.0, "{target:?}");
         assert_eq!((Step::of('q'), Step::of('1')), (None, None));

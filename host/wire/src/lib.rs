@@ -6,6 +6,7 @@ use blindgrasp_shared::control::{GAIN_COUNT, Signal};
 use blindgrasp_shared::estimate::Encoder;
 use blindgrasp_shared::identity::{BrownOut, Clock, Crash, Identity, ResetCause, Restored};
 use blindgrasp_shared::link::message;
+use blindgrasp_shared::math::Real as _;
 use blindgrasp_shared::parameters::{Parameter, Setting};
 use blindgrasp_shared::signals::Value;
 use blindgrasp_shared::telemetry::{self, INTERFACE_VERSION};
@@ -174,7 +175,7 @@ pub fn held(record: &Record) -> Move {
 
 /// Returns the rotation vector, rad, of an axis times the sine of half the angle.
 pub fn rotation_vector_rad(axis_sine: [f32; 3]) -> [f32; 3] {
-    let sine = axis_sine.iter().map(|v| v * v).sum::<f32>().sqrt();
+    let sine = axis_sine.iter().map(|v| v * v).sum::<f32>().square_root();
     let per_sine = if sine > 0.0 { 2.0 * sine.min(1.0).asin() / sine } else { 2.0 };
     axis_sine.map(|v| v * per_sine)
 }
