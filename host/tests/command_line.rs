@@ -122,7 +122,7 @@ fn out_writes_every_file_and_the_scene_reproduces_the_run() {
         let quantities = "f_N lambda_x lambda_z dr foot_x foot_z".split(' ');
         expected.extend(quantities.map(|quantity| format!("{quantity}_{finger}")));
     }
-    let energies = "energy kinetic elastic weight approach attitude integral motors damping indentation torsion friction pushes";
+    let energies = "energy kinetic elastic weight approach attitude integral frame frame_turn motors damping indentation torsion friction pushes";
     expected.extend(energies.split(' ').map(|name| format!("{name}_j")));
     expected.push("mode".to_owned());
     assert_eq!(header, expected);

@@ -25,6 +25,8 @@ pub fn template(hand: HandFile, object: ObjectFile, ideal: bool) -> Result<Scene
             "add a table [control] to its file, with the keys that a scene's has: force_n, attitude_stiffness_nm, ...",
         ));
     };
+    // It begins in touch.
+    let gains = Control { closing_speed_m_s: 0.0, ..gains };
     let control = if ideal { Control { soft_start_s: 0.0, end_stops: false, ..gains } } else { gains };
     let start = if ideal { Indentation::Equilibrium } else { Indentation::Metres(JUST_TOUCHING_M) };
     let model =

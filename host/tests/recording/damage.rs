@@ -331,7 +331,9 @@ fn a_bad_chunk_costs_its_own_records_whichever_it_is() {
                 let kept = |tick: &&u32| bad(tick) || numbers.contains(tick);
                 let gone = all.iter().find(|tick| !kept(tick));
                 assert_eq!(gone, None, "{which:?}, heads: {in_the_head}: {}", read(&copy).1);
-                assert!(in_the_head || numbers.len() == all.iter().filter(|tick| !bad(tick)).count());
+                // A flip within a run of zeros may come to the same bytes: a chunk is there as a whole, or not at all.
+                let good = all.iter().filter(|tick| !bad(tick)).count();
+                assert!(in_the_head || (numbers.len() - good).is_multiple_of(40));
                 let between = numbers.windows(2).map(|pair| u64::from(pair[1] - pair[0] - 1)).sum::<u64>();
                 assert_eq!(lost, between, "{which:?}");
             }

@@ -148,7 +148,7 @@ fn a_hand_that_begins_open_touches_nothing() {
         (
             "pick-cube",
             &["start.angles_rad=[0]"],
-            "scenes/pick-cube.toml:14: start.posture: angles are given as well; leave start.posture or start.angles_rad out",
+            "scenes/pick-cube.toml:15: start.posture: angles are given as well; leave start.posture or start.angles_rad out",
         ),
         (
             "cube",

@@ -70,7 +70,7 @@ fn what_no_scene_knows_is_no_sweep() {
         ),
         (
             "object=ball,egg",
-            "--vary: object: no built-in object is called `ball`; known: prism, cube, hexagonal-prism, cuboid, cuboid-printed, l-bracket, octahedron, brick, heavy-cube (a path has to end in .toml or contain a /; of meshes, .stl and .obj are read)",
+            "--vary: object: no built-in object is called `ball`; known: prism, cube, hexagonal-prism, cuboid, cuboid-printed, l-bracket, octahedron, brick, heavy-cube, cube-100g, prism-100g, hexagonal-prism-100g (a path has to end in .toml or contain a /; of meshes, .stl and .obj are read)",
         ),
     ] {
         assert_eq!(error(&[], &[key], 1), message);
