@@ -81,7 +81,7 @@ fn value(rust: &str) -> &'static str {
         "ContactLaw" | "AttitudeError" => "text",
         "HandFile" | "ObjectFile" => "text or table",
         "Vec<ContactFile>" | "Vec<PushFile>" | "Vec<TableFile>" | "Vec<MoveFile>" | "Vec<TurnFile>"
-        | "Vec<ShakeFile>" => "tables",
+        | "Vec<ShakeFile>" | "Vec<StepFile>" => "tables",
         "PoseFile" | "StartFile" | "Control" | "Sensors" | "Actuators" | "Friction" | "PlantSettings"
         | "ShapeFile" => "table",
         unknown => panic!("no words for the type {unknown}"),
