@@ -3,6 +3,7 @@
 
     blindgrasp_client.py info   --port /dev/ttyUSB0
     blindgrasp_client.py grasp  --port /dev/ttyUSB0 --force 3 --hold 5 --csv > grasp.csv
+    blindgrasp_client.py pick   --port /dev/ttyUSB0 --posture 1 --move 0,0,-15 --turn 0,0,20
     blindgrasp_client.py pil    --image pil.elf          # joints for the firmware in QEMU, in lockstep
     blindgrasp_client.py --self-test tests/data/wire/vectors.json
 
@@ -35,6 +36,7 @@ from blindgrasp_tables import (
     INTERFACE_VERSION,
     LAW_SIGNALS,
     MODES,
+    NOTICES,
     PARAMETERS,
     POTENTIALS,
     RECORD_FIELDS,
@@ -344,6 +346,11 @@ COMMAND = Enum(
     Release=None,
     Stop=None,
     ClearFault=None,
+    Aim=Struct(joint=BYTE, angle_rad=F32),
+    Posture=Struct(posture=Option(BYTE), time_ms=U16),
+    Move=Struct(position_m=Array(F32, 3), turn_rad=Array(F32, 3), about_m=Array(F32, 3), time_ms=U16),
+    PutDown=None,
+    Weigh=None,
 )
 ANSWER = Option(Struct(command=COMMAND, refused=Option(REFUSAL)))
 PACKET = Struct(
@@ -373,6 +380,7 @@ FIELDS = {
     "Mode": Enum(*MODES),
     "Option<Raised>": Option(FAULT),
     "Option<Answer>": Option(Struct(command=COMMAND, refused=Option(REFUSAL))),
+    "Option<Noticed>": Option(Struct(notice=Enum(*NOTICES), fingertip=Option(BYTE))),
     "Events": BYTE,
     "PerGain<f32>": per_law(GAINS, F32),
     "PerSignal<f32>": per_law(LAW_SIGNALS, F32),
@@ -564,6 +572,7 @@ class Session:
         self.line, self.on_record = line, on_record
         self.frames = Frames()
         self.number, self.sequence, self.identity = 0, 0, None
+        self.noticed = []  # since the last command
         self.waiting = set()  # numbers of heartbeats without an answer
         self.next_heartbeat = None
         self.records, self.inputs, self.lost, self.malformed = 0, 0, 0, 0
@@ -608,6 +617,9 @@ class Session:
         self.number_of(record)
         self.records += 1
         self.last_record = record
+        if record["notice"]:
+            self.noticed.append(record["notice"]["notice"])
+            print(NOTICES[self.noticed[-1]], file=sys.stderr)
         self.on_record(record)
 
     def number_of(self, told):
@@ -695,6 +707,7 @@ class Session:
         self.send("Goodbye")
 
     def command(self, command):
+        self.noticed.clear()
         return self.ask({"Command": command})
 
     def telemetry(self, decimation, signals):
@@ -813,13 +826,17 @@ def run_pil(session, args, out):
     if image["joint_count"] != args.joints:
         raise Trouble(f"the hand `{image['hand']}` has {image['joint_count']} joints: tell so with --joints")
     period_s = image["period_us"] * 1e-6
-    gains = wanted_gains({"force_n": args.force})
+    gains = wanted_gains({"force_n": args.force, "frame_stiffness_n_m": 0.0, "frame_turn_stiffness_nm": 0.0})
     at = {part: round(args.ticks * share) for part, share in [("grasp", 0.1), ("release", 0.5), ("end", 0.95)]}
+    # From touch, by the paper's law alone, and armed again after it.
+    settings = {0: "closing.speed_m_s", 1: "moving.speed_rad_s"}
     script = {3: "Arm", at["grasp"]: {"Grasp": {"gains": gains}}, at["release"]: "Release"}
     script[at["end"]] = "Disarm"
     modes, largest_nm = [], {mode: 0.0 for mode in MODES}
     for tick in range(args.ticks):
         request = {"Command": script[tick]} if tick in script else "Heartbeat" if tick % 50 == 2 else None
+        if tick in settings:
+            request = {"SetParameter": {**parameter(settings[tick]), "value": 0.0}}
         answer, record = session.turn(plant.counts(), request)
         if request and answer is None:
             raise Trouble(f"tick {tick} did not answer {request}")
@@ -916,6 +933,13 @@ def finite(text):
     return value
 
 
+def three(text):
+    values = [finite(part) for part in text.split(",")]
+    if len(values) != 3:
+        raise argparse.ArgumentTypeError(f"{text} is not X,Y,Z")
+    return values
+
+
 def run_grasp(session, args):
     """Arms, grasps, holds and releases, with telemetry; whatever happens, the hand is stopped at the end."""
     state = lambda: session.last_record and session.last_record["mode"]
@@ -926,12 +950,48 @@ def run_grasp(session, args):
         if session.pump(args.hold, lambda: state() == "Fault"):
             raise Trouble(told_fault(session.last_record["fault"]))
         session.command("Release")
-        if not session.pump(10.0, lambda: state() in ("Armed", "Fault")) or state() == "Fault":
+        if not session.pump(10.0, lambda: state() in ("Armed", "Moving", "Fault")) or state() == "Fault":
             raise Trouble("the release does not end as it should")
         session.command("Disarm")
         session.pump(PATIENCE_S, lambda: state() == "Disarmed")
     except BaseException as error:
         # What another program leads is not stopped under its hands.
+        if not (isinstance(error, Refused) and error.refusal == "SessionTaken"):
+            session.command("Stop")
+        raise
+
+
+def wait_for(session, *notices, patience_s=20.0):
+    """Lives until the hand has noticed one of these since its last command."""
+    over = lambda: [notice for notice in session.noticed if notice in notices]
+    ended = ("Empty", "NeverTouched", "Lost")
+    is_bad = lambda: session.last_record["mode"] == "Fault" or any(bad in session.noticed for bad in ended)
+    if not session.pump(patience_s, lambda: over() or is_bad()) or not over():
+        raise Trouble(f"the hand does not tell: {' or: '.join(NOTICES[notice] for notice in notices)}")
+
+
+def run_pick(session, args):
+    """Opens to a posture, closes, lifts and turns what it holds, puts it down and lets go."""
+    session.telemetry(args.decimation, args.signals)
+    session.pump(PATIENCE_S, lambda: session.last_record)
+    try:
+        session.command("Arm")
+        if args.posture is not None:
+            session.command({"Posture": {"posture": args.posture, "time_ms": 0}})
+            wait_for(session, "InPosture")
+        session.command({"Grasp": {"gains": wanted_gains({"force_n": args.force})}})
+        wait_for(session, "Holding")
+        way = {"position_m": [mm * 1e-3 for mm in args.move], "turn_rad": [math.radians(deg) for deg in args.turn]}
+        session.command({"Move": {**way, "about_m": [0.0] * 3, "time_ms": 0}})
+        wait_for(session, "AtTarget")
+        session.pump(args.hold)
+        session.command("PutDown")
+        wait_for(session, "OnGround", "Lowered")
+        session.command("Release")
+        wait_for(session, "Opened")
+        session.command("Disarm")
+        session.pump(PATIENCE_S, lambda: session.last_record["mode"] == "Disarmed")
+    except BaseException as error:
         if not (isinstance(error, Refused) and error.refusal == "SessionTaken"):
             session.command("Stop")
         raise
@@ -958,7 +1018,7 @@ def run(args, out):
     settings = [parameter(args.key)] if args.command in ("get", "set") else []
     # A stop is of nobody's session, without a hello, and goes to a hand that another program leads, too.
     # Records on the line may still be those that another program has asked for.
-    shows_records = args.command in ("watch", "grasp")
+    shows_records = args.command in ("watch", "grasp", "pick")
     heard = printer if shows_records else lambda record: None
     session = Session(Line.open(args.port, alone=args.command != "stop"), heard)
     if args.command == "stop":
@@ -981,6 +1041,8 @@ def run(args, out):
             run_burst(session, printer)
         elif args.command == "grasp":
             run_grasp(session, args)
+        elif args.command == "pick":
+            run_pick(session, args)
     finally:
         session.goodbye()
     print(json.dumps(session.counted()), file=sys.stderr)
@@ -1078,6 +1140,12 @@ def arguments():
     gain = {"type": gain_value, "metavar": "NAME=VALUE", "action": "append", "default": []}
     grasp.add_argument("--gain", **gain, help=f"{', '.join(names)}; as configured if left out")
     grasp.add_argument("--hold", type=finite, default=5.0, help="seconds")
+    pick = command("pick", "pick up, move, put down", True)
+    pick.add_argument("--posture", type=int, choices=range(8), metavar="N", help="go to this posture of the hand's file first")
+    pick.add_argument("--force", type=finite, help="N; as configured if left out")
+    pick.add_argument("--move", type=three, default=[0.0, 0.0, 0.0], metavar="X,Y,Z", help="mm, in the base frame")
+    pick.add_argument("--turn", type=three, default=[0.0, 0.0, 0.0], metavar="X,Y,Z", help="a rotation vector, degrees")
+    pick.add_argument("--hold", type=finite, default=1.0, help="seconds up there")
     pil = command("pil", "be the joints of the image `pil`: springs with dampers, in lockstep")
     pil.add_argument("--image", help="start this image in QEMU, instead of --port")
     pil.add_argument("--joints", type=int, default=12, help="of the hand")

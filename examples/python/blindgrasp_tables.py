@@ -1,6 +1,6 @@
 """Vocabulary of the wire, written by tests/tests/protocol.rs from the tables of the firmware."""
 
-INTERFACE_VERSION = 5
+INTERFACE_VERSION = 6
 FAULTS = {
     1: "encoder gave no sample",
     2: "angle, speed or torque is not a finite number",
@@ -49,6 +49,30 @@ REFUSALS = {
     "NoStore": "this hand has nothing to save to: an emulator has no flash",
     "NoSpare": "no room is left to save to: a reset of the board makes some",
     "NotSaved": "the flash did not take it; what was saved before is valid",
+    "Closing": "the fingertips are closing: wait for their touch, release, or stop",
+    "NotCarrying": "nothing is held firmly: grasp first, and wait until the hand is carrying",
+    "PuttingDown": "what is held is being put down: wait for the end, release, or stop",
+    "Weighing": "what is held is being weighed: wait for the end, release, or stop",
+    "NoSuchPosture": "this hand has no posture of this number",
+    "NoSuchJoint": "this hand has no joint of this number",
+    "BeyondRange": "an angle is beyond the range of its joint, or in the margin of its end stop",
+    "NoPath": "this hand's file gives no speed to move at: see its section `moving`",
+    "TooFast": "the way is too far for its time: give it longer, or 0 for the shortest",
+    "TooFar": "the way, or the turn, is longer than the hand's file allows",
+    "NoGravity": "this hand is not told where down is: see `gravity_m_s2`",
+}
+NOTICES = {
+    "InPosture": "the posture is reached",
+    "Touched": "all fingertips touch: the grasp begins",
+    "Empty": "there is nothing between the fingertips: the hand opens again",
+    "NeverTouched": "this fingertip touches nothing, though others do: the hand opens again",
+    "Holding": "the grasp is at its force: what is held can be moved",
+    "Lost": "what was held is gone: the hand opens again",
+    "AtTarget": "the target is where it was to go",
+    "Weighed": "it is weighed",
+    "OnGround": "it stands on something",
+    "Lowered": "it was put down as far as is stated, and nothing was felt below it",
+    "Opened": "the grasp is let go",
 }
 EVENTS = {
     "heartbeat": 1,
@@ -66,16 +90,19 @@ LIMITS = {
 GAINS = {
     "grasp": ["force_n", "attitude_stiffness_nm"],
     "integral": ["integral_gain_nm_rad"],
+    "frame": ["frame_stiffness_n_m", "frame_turn_stiffness_nm"],
 }
 POTENTIALS = {
     "grasp": ["approach_potential_j", "attitude_potential_j"],
     "integral": ["integral_potential_j"],
+    "frame": ["frame_potential_j", "frame_turn_potential_j"],
 }
 LAW_SIGNALS = {
     "grasp": [],
     "integral": [],
+    "frame": ["object_x_m", "object_y_m", "object_z_m", "object_turn_x", "object_turn_y", "object_turn_z"],
 }
-MODES = ["Disarmed", "Armed", "Grasping", "Releasing", "Fault"]
+MODES = ["Disarmed", "Armed", "Moving", "Closing", "Grasping", "Carrying", "PuttingDown", "Releasing", "Fault"]
 # By their numbers.
 PARAMETERS = [
     "damping_nm_s",
@@ -99,6 +126,26 @@ PARAMETERS = [
     "supervisor.soft_start_ms",
     "supervisor.release_ms",
     "supervisor.amplifier_start_ms",
+    "frame_damping_s",
+    "frame_turn_damping_s",
+    "frame_reach_m",
+    "moving.inertia_kg_m2",
+    "moving.bandwidth_rad_s",
+    "moving.speed_rad_s",
+    "moving.integral_nm",
+    "closing.speed_m_s",
+    "closing.stiffness_n_m",
+    "closing.force_n",
+    "closing.damping_n_s_m",
+    "carrying.reach_m",
+    "carrying.reach_rad",
+    "carrying.speed_m_s",
+    "carrying.speed_rad_s",
+    "carrying.integral_n",
+    "carrying.correction_hz",
+    "carrying.put_down_m_s",
+    "carrying.put_down_m",
+    "carrying.put_down_n",
     "encoder_reversed",
     "encoder_zero_count",
     "motor_reversed",
@@ -106,11 +153,16 @@ PARAMETERS = [
     "force_n",
     "attitude_stiffness_nm",
     "integral_gain_nm_rad",
+    "frame_stiffness_n_m",
+    "frame_turn_stiffness_nm",
     "limits.force_n",
     "limits.attitude_stiffness_nm",
     "limits.integral_gain_nm_rad",
+    "limits.frame_stiffness_n_m",
+    "limits.frame_turn_stiffness_nm",
     "laws.grasp",
     "laws.integral",
+    "laws.frame",
 ]
 # Names and types of a record's fields, in the order of their bytes.
 RECORD_FIELDS = [
@@ -119,6 +171,7 @@ RECORD_FIELDS = [
     ("mode", "Mode"),
     ("fault", "Option<Raised>"),
     ("answer", "Option<Answer>"),
+    ("notice", "Option<Noticed>"),
     ("events", "Events"),
     ("reading_failed", "Option<Raised>"),
     ("gains", "PerGain<f32>"),
@@ -127,6 +180,7 @@ RECORD_FIELDS = [
     ("work_j", "f32"),
     ("damped_j", "f32"),
     ("excess_j", "f32"),
+    ("weight_n", "f32"),
     ("cycles", "u32"),
     ("late_ticks", "u32"),
     ("dropped", "u32"),

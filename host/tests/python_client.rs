@@ -88,7 +88,7 @@ fn the_python_client_grasps_with_a_simulated_hand() {
     let mut modes: Vec<&str> = rows.iter().map(|row| row[2]).collect();
     let releasing = modes.iter().filter(|&&mode| mode == "Releasing").count();
     modes.dedup();
-    assert_eq!(modes, ["Disarmed", "Armed", "Grasping", "Releasing", "Armed", "Disarmed"]);
+    assert_eq!(modes, ["Disarmed", "Armed", "Grasping", "Releasing", "Moving", "Disarmed"]);
     assert_eq!(releasing, 300, "the release takes 300 ms");
     let names: Vec<&str> = out.lines().next().expect("a head").split(',').collect();
     let column = |name: &str| names.iter().position(|&other| other == name).expect("a column");
@@ -99,4 +99,31 @@ fn the_python_client_grasps_with_a_simulated_hand() {
     assert!(rows.iter().all(|row| row[first..=last].iter().all(|count| count.parse::<i32>().is_ok())));
     // The fingers close.
     assert_ne!(rows[0][first..=last], rows[rows.len() / 2][first..=last]);
+}
+
+#[test]
+fn the_python_client_picks_up_what_lies_before_a_simulated_hand() {
+    let served = Served::start(Path::new("pick-cube"));
+    let (code, out, err) =
+        served.client(&["pick", "--posture", "1", "--move", "0,0,-15", "--turn", "0,0,20", "--csv"]);
+    assert_eq!(code, Some(0), "{err}");
+    let told: Vec<&str> = err.lines().filter(|line| !line.starts_with('{')).collect();
+    let wanted = [
+        "the posture is reached",
+        "all fingertips touch: the grasp begins",
+        "the grasp is at its force: what is held can be moved",
+        "the target is where it was to go",
+        "it stands on something",
+        "the grasp is let go",
+    ];
+    assert_eq!(told, wanted, "{err}");
+    // It was up there, as the hand knows it.
+    let names: Vec<&str> = out.lines().next().expect("a head").split(',').collect();
+    let column = names.iter().position(|&name| name == "object_z_m").expect("a column");
+    let heights_m = out
+        .lines()
+        .skip(1)
+        .map(|row| row.split(',').nth(column).expect("a cell").parse::<f64>().expect("a number"));
+    let highest_m = heights_m.fold(0.0, f64::min);
+    assert!((-0.02..=-0.012).contains(&highest_m), "{highest_m}");
 }

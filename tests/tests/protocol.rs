@@ -6,8 +6,9 @@
 
 use blindgrasp::body::MAX_JOINTS;
 use blindgrasp::model::HandModel;
-use blindgrasp_shared::command::{Answer, Command, Grasp, Refusal};
+use blindgrasp_shared::command::{Answer, Command, Grasp, Move, Refusal};
 use blindgrasp_shared::control::{GAINS, Gain, LAWS, PerGain, PerSignal, SIGNALS, Signal};
+use blindgrasp_shared::cycle::{Notice, Noticed};
 use blindgrasp_shared::event::{Event, Events};
 use blindgrasp_shared::fault::{Fault, Raised, Reaction};
 use blindgrasp_shared::identity::{
@@ -106,6 +107,12 @@ fn packets() -> Vec<(&'static str, Packet<J>)> {
     let grasp = Grasp { gains: PerGain { grasp: [Some(3.5), None], ..PerGain::all(None) } };
     let mut earlier = Grasp::CONFIGURED;
     (earlier.gains.grasp, earlier.gains.integral) = ([None, Some(0.0)], [Some(0.25)]);
+    let movement = Move {
+        position_m: [0.0, 0.0, -0.015],
+        turn_rad: [0.0, 0.0, 0.35],
+        about_m: [0.0, 0.0, 0.025],
+        time_ms: 800,
+    };
     let at_rest: Vec<i32> = (0..JOINTS as i32).map(|k| 300 * k - 1500).collect();
     let command = Request::Command;
     let requests = [
@@ -118,6 +125,12 @@ fn packets() -> Vec<(&'static str, Packet<J>)> {
         ("release", command(Command::Release)),
         ("stop", command(Command::Stop)),
         ("clear fault", command(Command::ClearFault)),
+        ("aim a joint", command(Command::Aim { joint: 4, angle_rad: -0.5 })),
+        ("posture 1, in the shortest time", command(Command::Posture { posture: Some(1), time_ms: 0 })),
+        ("posture that is aimed at, in 1.5 s", command(Command::Posture { posture: None, time_ms: 1500 })),
+        ("move 15 mm up and by 20 degrees", command(Command::Move(movement))),
+        ("put down", command(Command::PutDown)),
+        ("weigh", command(Command::Weigh)),
         ("heartbeat", Request::Heartbeat),
         (
             "set a torque limit",
@@ -213,6 +226,7 @@ fn faulted() -> AnyRecord {
         mode: Mode::Fault,
         fault: Some(Raised::at(2, Fault::CountJump)),
         answer: Some(Answer { command: Command::ClearFault, refused: Some(Refusal::FaultPersists) }),
+        notice: Some(Noticed::at(1, Notice::NeverTouched)),
         events: Events::NONE.with(Event::Late, true),
         reading_failed: Some(Raised::of_hand(Fault::SampleMissing)),
         gains: of_laws([5.0, 0.005], 0.375),
@@ -220,6 +234,7 @@ fn faulted() -> AnyRecord {
         law_signals: PerSignal::all(0.0),
         work_j: -0.5,
         damped_j: 0.03125,
+        weight_n: 0.75,
         cycles: 20_000,
         late_ticks: 2,
         dropped: 1,
@@ -423,7 +438,7 @@ fn malformed() -> Vec<serde_json::Value> {
         ("a number that does not end", vec![0xff, 0xff, 0xff, 0xff, 2]),
         ("a byte too many", [&heartbeat[..], &[0]].concat()),
         ("no request", heartbeat[..heartbeat.len() - 1].to_vec()),
-        ("a command of a later version", vec![1, 1, 1, 6]),
+        ("a command of a later version", vec![1, 1, 1, 11]),
         ("an option that is neither", vec![1, 1, 1, 2, 2, 0]),
         ("a bool that is neither", vec![1, 1, 6, 0, 0, 2]),
         ("a fault of a later version", vec![1, 1, 6, 0, 1, 200, 0, 0]),
@@ -522,12 +537,19 @@ fn the_tables_of_the_document_are_those_of_the_code() {
                     let gains = GAINS.map(|gain| format!("`{}`", gain.key)).join(", ");
                     format!("{k} {words} (of {gains} an option of f32 each)")
                 }
+                Command::Aim { .. } => format!("{k} {words} (`joint: u8`, `angle_rad: f32`)"),
+                Command::Posture { .. } => format!("{k} {words} (`posture: option u8`, `time_ms: u16`)"),
+                Command::Move(_) => {
+                    format!("{k} {words} (`position_m`, `turn_rad`, `about_m`: 3 `f32` each, `time_ms: u16`)")
+                }
                 _ => format!("{k} {words}"),
             }
         })
         .collect();
     check(DOCUMENT, "commands", &(commands.join(", ") + ".\n"));
     check(DOCUMENT, "refusals", &table(three, &numbered(Refusal::ALL, |refusal| refusal.words())));
+    let notices = numbered(Notice::ALL, |notice| notice.words());
+    check(DOCUMENT, "notices", &table(three, &notices));
     check(DOCUMENT, "modes", &listed(&Mode::ALL, |mode| mode.words()));
     let faults: Vec<[String; 4]> = Fault::ALL
         .iter()
@@ -572,6 +594,7 @@ fn the_tables_of_the_document_are_those_of_the_code() {
                 "Mode" => "mode",
                 "Option<Raised>" => "`option raised`",
                 "Option<Answer>" => "option of `command` and `refused: option refusal`",
+                "Option<Noticed>" => "`option noticed`",
                 "Events" => "events",
                 "PerGain<f32>" => "`f32` for each gain of each law, without their number",
                 "PerSignal<f32>" => "`f32` for each other signal of each law, without their number",
@@ -633,6 +656,8 @@ fn the_tables_of_the_client_are_those_of_the_code() {
         Fault::ALL.iter().map(|fault| (fault.number().to_string(), text(fault.words()))).collect(),
     );
     dictionary("REFUSALS", Refusal::ALL.iter().map(|r| (text(&format!("{r:?}")), text(r.words()))).collect());
+    let notices = Notice::ALL.iter().map(|n| (text(&format!("{n:?}")), text(n.words())));
+    dictionary("NOTICES", notices.collect());
     dictionary("EVENTS", Event::ALL.map(|event| (text(event.key()), (event as u8).to_string())).into());
     dictionary("LIMITS", Limit::ALL.map(|limit| (text(limit.key()), (limit as u8).to_string())).into());
     let per_law = |keys: &[(u8, &str)]| {
@@ -669,20 +694,34 @@ fn the_tables_of_the_client_are_those_of_the_code() {
 
 #[test]
 fn the_table_of_modes_is_that_of_the_code() {
-    let rows = Mode::ALL.map(|mode| {
-        let events =
-            Command::ALL.into_iter().map(ModeEvent::Command).chain([ModeEvent::Fault, ModeEvent::Released]);
-        let cells = events.map(|event| match outcome(mode, event) {
+    let cells = |mode: Mode, events: &[ModeEvent]| {
+        let cell = |&event: &ModeEvent| match outcome(mode, event) {
             Outcome::Enter(next) if next == mode => "stays".to_owned(),
             Outcome::Enter(next) => format!("**{}**", next.words()),
-            Outcome::Refuse(refusal) => format!("refused: `{refusal:?}`"),
-        });
-        let cells: Vec<String> = std::iter::once(mode.words().to_owned()).chain(cells).collect();
-        <[String; 9]>::try_from(cells).expect("six commands and two more")
-    });
-    let head =
-        ["mode", "arm", "disarm", "grasp", "release", "stop", "clear fault", "*a fault*", "*release over*"];
+            Outcome::Refuse(refusal) => format!("`{refusal:?}`"),
+        };
+        std::iter::once(mode.words().to_owned()).chain(events.iter().map(cell)).collect::<Vec<_>>()
+    };
+    let commands = Command::ALL.map(ModeEvent::Command);
+    let rows = Mode::ALL.map(|mode| <[String; 12]>::try_from(cells(mode, &commands)).expect("a cell each"));
+    let words = Command::ALL.map(Command::words);
+    let head: Vec<&str> = std::iter::once("mode").chain(words).collect();
+    let head = <[&str; 12]>::try_from(head).expect("a column each");
     check(DOCUMENT, "table of modes", &table(head, &rows));
+    let events = [
+        (ModeEvent::Fault, "fault"),
+        (ModeEvent::Released, "release over"),
+        (ModeEvent::Opened, "release over, and there is a posture `open`"),
+        (ModeEvent::Touched, "all fingertips touch"),
+        (ModeEvent::Missed, "empty, or lost"),
+        (ModeEvent::Firm, "force at its full, and there is a virtual frame"),
+        (ModeEvent::Down, "put down"),
+    ];
+    let of_events = events.map(|(event, _)| event);
+    let rows = Mode::ALL.map(|mode| <[String; 8]>::try_from(cells(mode, &of_events)).expect("a cell each"));
+    let head: Vec<&str> = std::iter::once("mode").chain(events.map(|(_, words)| words)).collect();
+    let head = <[&str; 8]>::try_from(head).expect("a column each");
+    check(DOCUMENT, "table of events", &table(head, &rows));
 }
 
 #[test]
@@ -692,7 +731,7 @@ fn the_examples_of_the_document_are_those_of_the_code() {
         named.unwrap_or_else(|| panic!("there is no vector {name}"))
     };
     let mut text = String::new();
-    for name in ["hello", "arm", "grasp with 3.5 N"] {
+    for name in ["hello", "arm", "grasp with 3.5 N", "move 15 mm up and by 20 degrees"] {
         let vector = find(name);
         let words = |key: &str| vector[key].as_str().expect("a text").to_owned();
         let _ = write!(

@@ -86,7 +86,7 @@ fn its_self_test_can_fail() {
         ("\"payload\":\"01b424", "\"payload\":\"02b424"),
         ("\"why\":\"TooShort\"", "\"why\":\"BadCrc\""),
         ("\"digest\":", "\"digest\":1"),
-        ("\"interface_version\": 5", "\"interface_version\": 3"),
+        ("\"interface_version\": 6", "\"interface_version\": 3"),
     ];
     for (from, to) in changes {
         assert!(vectors.contains(from), "{from}");
