@@ -358,7 +358,6 @@ mod monitor {
                 joint: (joints > 0 && random.bool()).then(|| random.usize(0..joints)),
                 help: random.u8(0..10) == 0,
                 question: None,
-                is_jogging: false,
                 palette: Palette { coloured: random.bool() },
             };
             let size = TestBackend::new(random.u16(1..160), random.u16(1..60));
