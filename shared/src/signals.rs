@@ -5,7 +5,7 @@
 //! schemas, comparisons or views. The gains and signals of the laws come from the list of [laws](crate::control).
 
 use crate::bytes::BufferTooSmall;
-use crate::command::{Answer, Command, Grasp, Refusal};
+use crate::command::{Answer, Command, Refusal};
 use crate::control::{GAIN_COUNT, GAINS, PerGain, PerSignal, SIGNAL_COUNT, SIGNALS, Signal};
 use crate::cycle::{Notice, Noticed};
 use crate::event::{Event, Events};
@@ -350,7 +350,7 @@ impl Field for Option<Answer> {
     const BLANK: Self = None;
     const MOST_BYTES: usize = OPTION + Command::MOST_BYTES + OPTION + 1;
     type Kept = (Command, u8);
-    const KEPT: (Command, u8) = (Command::Grasp(Grasp::CONFIGURED), 0);
+    const KEPT: (Command, u8) = (Command::Arm, 0);
 
     fn keep(&self) -> Self::Kept {
         self.map_or(Self::KEPT, |Answer { command, refused }| {

@@ -92,7 +92,8 @@ fn script(seed: u64, ticks: usize, is_cycle: bool) -> Vec<Step> {
             let fault = [Fault::SampleMissing, Fault::CounterReset, Fault::LinkLost][lcg.below(3) as usize];
             Step {
                 counts,
-                failed: (lcg.below(if is_cycle { 3000 } else { 300 }) == 0).then(|| Raised::at(lcg.below(12) as usize, fault)),
+                failed: (lcg.below(if is_cycle { 3000 } else { 300 }) == 0)
+                    .then(|| Raised::at(lcg.below(12) as usize, fault)),
                 events: Events::NONE
                     .with(Event::Heartbeat, silent == 0)
                     .with(Event::Late, lcg.below(30) == 0),

@@ -155,11 +155,17 @@ impl<T: Real, const F: usize> Frame<T, F> {
         for (point, arm) in points_m.iter().zip(&arms_m).take(count) {
             let offset = point - centroid;
             off += cross(arm, &offset);
-            for row in 0..3 {
-                for column in 0..3 {
-                    h[(row, column)] += offset[row] * arm[column];
-                }
-            }
+            h += Matrix3::new(
+                offset.x * arm.x,
+                offset.x * arm.y,
+                offset.x * arm.z,
+                offset.y * arm.x,
+                offset.y * arm.y,
+                offset.y * arm.z,
+                offset.z * arm.x,
+                offset.z * arm.y,
+                offset.z * arm.z,
+            );
         }
         let spread_1_m2 = spread(&h);
         let step = times(&spread_1_m2, &off);

@@ -178,14 +178,15 @@ impl<const F: usize> Carry<F> {
         *self = Self { weight_n: self.weight_n, ..Self::new() };
         let mut points_m = posture.centres_m;
         let mut squares = 0.0;
-        for (i, fingertip) in hand.prepared_fingertips().iter().enumerate() {
-            let arm = latch.frame.arms_m[i];
-            let length = norm(&arm);
+        let fingertips = hand.prepared_fingertips().iter().zip(&latch.frame.arms_m);
+        for ((fingertip, arm), (touch, point)) in fingertips.zip(self.touches_m.iter_mut().zip(&mut points_m))
+        {
+            let length = norm(arm);
             squares += length * length;
             if length > 0.0 {
-                self.touches_m[i] = arm * (-fingertip.radius_m / length);
+                *touch = arm * (-fingertip.radius_m / length);
             }
-            points_m[i] += self.touches_m[i];
+            *point += *touch;
         }
         let count = hand.fingertip_count();
         self.points = frame::Latch::of_points(&points_m, count);
@@ -245,9 +246,10 @@ impl<const F: usize> Carry<F> {
         let frame = Frame::seen(hand, &posture.centres_m, &latch.frame, &self.turn);
         self.turn = frame.pose.turn;
         let mut points_m = posture.centres_m;
-        for (i, point) in points_m.iter_mut().enumerate().take(hand.fingertip_count()) {
-            let turned = product_transposed(&posture.attitudes[i], &latch.grasp.attitudes[i]);
-            *point += turn_vector(&turned, &self.touches_m[i]);
+        let attitudes = posture.attitudes.iter().zip(&latch.grasp.attitudes);
+        let touched = points_m.iter_mut().zip(attitudes).zip(&self.touches_m).take(hand.fingertip_count());
+        for ((point, (attitude, latched)), touch) in touched {
+            *point += turn_vector(&product_transposed(attitude, latched), touch);
         }
         let object = Frame::seen(hand, &points_m, &self.points, &self.object_turn).pose;
         self.object_turn = object.turn;

@@ -218,11 +218,12 @@ impl<const F: usize> Closing<F> {
     ) -> Followed {
         let mut followed = Followed::NOTHING;
         let velocities_m_s = hand.fingertip_velocities(posture, speeds_rad_s);
-        for (i, fingertip) in hand.prepared_fingertips().iter().enumerate() {
-            let (centre, direction) = (&posture.centres_m[i], &self.directions[i]);
-            let reference = self.way_m.limited(0.0, self.lengths_m[i]);
-            let moves = !self.is_stopped && self.way_m < self.lengths_m[i];
-            let off = self.origins_m[i] + direction * reference - centre;
+        let fingertips = hand.prepared_fingertips().iter().zip(&posture.centres_m).zip(&velocities_m_s);
+        let ways = self.origins_m.iter().zip(&self.directions).zip(&self.lengths_m);
+        for (((fingertip, centre), velocity), ((origin, direction), &length)) in fingertips.zip(ways) {
+            let reference = self.way_m.limited(0.0, length);
+            let moves = !self.is_stopped && self.way_m < length;
+            let off = origin + direction * reference - centre;
             let mut pull = off * config.stiffness_n_m;
             let force = norm(&pull);
             let lag = config.force_n / config.stiffness_n_m;
@@ -233,7 +234,7 @@ impl<const F: usize> Closing<F> {
                 followed.potential_j += 0.5 * force * force / config.stiffness_n_m;
             }
             let speed = if moves { config.speed_m_s } else { 0.0 };
-            let slow = direction * speed - velocities_m_s[i];
+            let slow = direction * speed - velocity;
             let force_n = (pull + slow * config.damping_n_s_m) * share;
             followed.fed_j += dot(&force_n, direction) * (speed * period.seconds());
             let wrench = Wrench { force_n, moment_nm: Vector3::zeros() };

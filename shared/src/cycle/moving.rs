@@ -88,7 +88,10 @@ impl<const J: usize> Moving<J> {
         let per_s = 1_000_000.0 / period.microseconds() as f32;
         let w = config.bandwidth_rad_s;
         let most = config.integral_nm;
-        for k in (0..J).filter(|&k| is_moved(k)) {
+        for k in 0..J {
+            if !is_moved(k) {
+                continue;
+            }
             let inertia = config.inertia_kg_m2[k];
             let error = place.value[k] - motion.angles_rad[k];
             let slow = place.per_tick[k] * per_s - motion.speeds_rad_s[k];

@@ -5,12 +5,12 @@ use crate::signals::Kept;
 use crate::supervisor::Mode;
 
 /// Records before the tick that entered the fault, at most.
-pub const BEFORE: usize = 128;
+pub const BEFORE: usize = 120;
 /// Records from that tick on.
 pub const AFTER: usize = 64;
 
 /// A ring of the last records, which stands still a little after a fault. A record of twelve joints takes some 300 bytes,
-/// the ring of 192 some 55 KiB: too much for a stack, so that it is made where it stays.
+/// the ring of 184 some 55 KiB: too much for a stack, so that it is made where it stays.
 #[derive(Clone, Debug)]
 pub struct Burst<const J: usize> {
     ring: [Kept<J>; BEFORE + AFTER],
