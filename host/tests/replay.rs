@@ -55,6 +55,8 @@ fn command(path: &Path, arguments: &[&str]) -> Output {
 fn streaming(path: &Path) -> Session {
     let mut session = Session::new(path);
     session.hello();
+    // A grasp that begins at once: nothing is there to be touched.
+    session.set(Parameter::CLOSING_SPEED, 0, 0.0);
     session.telemetry(1, Signals::FULL);
     session
 }
@@ -79,6 +81,8 @@ fn whole_session(waiting: fn(u32) -> usize) {
     let mut session = Session::new(&path);
     session.waiting = waiting;
     session.hello();
+    // A grasp that begins at once: nothing is there to be touched.
+    session.set(Parameter::CLOSING_SPEED, 0, 0.0);
     session.telemetry(1, Signals::FULL);
     session.run(10);
     assert_eq!(session.command(Command::Arm).mode, Mode::Armed);
@@ -158,6 +162,8 @@ fn a_device_that_starts_anew_is_followed_again() {
     let first = session.arrived;
     session.restart(37);
     session.hello();
+    // A grasp that begins at once: nothing is there to be touched.
+    session.set(Parameter::CLOSING_SPEED, 0, 0.0);
     session.telemetry(1, Signals::FULL);
     session.run(10);
     session.command(Command::Arm);
@@ -183,6 +189,9 @@ fn parameters_that_change_are_taken_over_with_the_next_snapshot() {
     session.command(Command::Disarm);
     session.run(10);
     session.set(Parameter::gain(0), 0, 7.0);
+    // Without the virtual frame nobody misses what is not there.
+    session.set(Parameter::gain(3), 0, 0.0);
+    session.set(Parameter::gain(4), 0, 0.0);
     session.set(Parameter::DAMPING, 2, 0.125);
     session.run(1100);
     session.command(Command::Arm);

@@ -2,14 +2,14 @@
 
 use super::device::{Firmware, PATIENCE, Wrong};
 use blindgrasp::device::client::Client;
-use blindgrasp::model::Scene;
+use blindgrasp::model::{HandModel, Scene};
 use blindgrasp::record::compare::Value;
 use blindgrasp::rig::pil::{Linked, PilError, Pilot, Plan};
 use blindgrasp::sim::{Run, Simulation};
 use blindgrasp_shared::parameters::Parameter;
 use std::time::{Duration, Instant};
 
-/// Ticks before the grasp of a scene that changes nothing: hello, 11 parameters of the hand, 9 of each of 12 joints, 3 of
+/// Ticks before the grasp of a scene: hello, what it changes, 11 parameters of the hand, 9 of each of 12 joints, 3 of
 /// gravity, a heartbeat, arming; the slew limit and what else is switched off is asked for, too.
 fn ticks_before(scene: &Scene) -> u32 {
     use blindgrasp_shared::parameters::Each;
@@ -22,7 +22,28 @@ fn ticks_before(scene: &Scene) -> u32 {
             Each::Axis => 3,
         })
         .sum();
-    asked + 3
+    asked + changed(scene) + 3
+}
+
+/// Parameters that are other in a scene than in its hand's file, and are set.
+fn changed(scene: &Scene) -> u32 {
+    let hand = HandModel::of(scene).expect("a hand");
+    let params = |config| hand.params(config).expect("parameters");
+    let (ours, theirs) = (params(&scene.controller_config()), params(&hand.config));
+    let all = Parameter::ALL
+        .into_iter()
+        .flat_map(|parameter| (0..parameter.count(scene.joints.len())).map(move |index| (parameter, index)));
+    let is_changed = |&(parameter, index): &(Parameter, u8)| {
+        let (Ok(ours), Ok(theirs)) = (ours.get(parameter, index), theirs.get(parameter, index)) else {
+            return false;
+        };
+        // The file says the most that may be asked for.
+        match parameter.key().to_string().starts_with("limits.") {
+            true => ours.value < theirs.value,
+            false => ours.value != theirs.value,
+        }
+    };
+    all.filter(is_changed).count() as u32
 }
 
 fn scene(settings: &[&str]) -> Scene {
