@@ -105,15 +105,21 @@ fn a_cube_is_picked_up_in_eight_lines() {
 }
 
 #[test]
-fn the_script_of_the_page_does_the_same() {
+fn the_script_of_the_page_does_the_same_and_its_record_is_replayed_to_the_bit() {
     let (folder, page) = (TempDir::new().expect("a folder"), page());
     let commands = commands(&page);
     let (_served, _, port) = start(commands[0], &folder);
     wait(&port, "port ");
-    let (mut running, mut keys, lines) = start(commands[1], &folder);
+    let path = folder.path().join("pick.mcap");
+    let console = commands[1].split("  #").next().expect("a command");
+    let (mut running, mut keys, lines) = start(&format!("{console} --out {}", path.display()), &folder);
     keys.write_all(script(&page).as_bytes()).expect("the console listens");
     drop(keys);
     wait(&lines, "it stands on something");
     wait(&lines, "disarm: done");
     assert!(running.0.wait().expect("it ends").success());
+    let replay =
+        Command::new(env!("CARGO_BIN_EXE_blindgrasp")).arg("replay").arg(&path).output().expect("it runs");
+    let report = String::from_utf8_lossy(&replay.stdout);
+    assert!(replay.status.success() && report.contains("none differs"), "{report}");
 }
