@@ -18,6 +18,7 @@ use blindgrasp_shared::fault::Raised;
 use blindgrasp_shared::hand::Posture;
 use blindgrasp_shared::joints::{Joints, Reading};
 use blindgrasp_shared::link::message::{Form, Packet, Reply, Request, Signals};
+use blindgrasp_shared::parameters::Parameter;
 use blindgrasp_shared::supervisor::Mode;
 use blindgrasp_shared::telemetry::INTERFACE_VERSION;
 use blindgrasp_shared::telemetry::snapshot::BYTES_PER_JOINT;
@@ -125,8 +126,10 @@ pub fn run(timer: &mut SYST, control: &mut Control) -> Result<(), &'static str> 
     let counter = Counter::new(timer);
     let params = params();
     let mut figures = Figures::default();
-    figures.law_gravity_on = law(&counter, &params, &params.config().laws)?;
+    // The paper's law; the virtual frame is in the whole tick.
     let mut without = params.config().laws;
+    without.gains.frame = [0.0; 2];
+    figures.law_gravity_on = law(&counter, &params, &without)?;
     without.hold.gravity_m_s2 = None;
     figures.law_gravity_off = law(&counter, &params, &without)?;
     whole_tick(&counter, &params, control, &mut figures)?;
@@ -180,6 +183,8 @@ fn whole_tick(
         let request = match tick {
             0 => Request::Hello { interface_version: INTERFACE_VERSION },
             1 => Request::Telemetry { decimation: 1, signals: Signals::FULL },
+            // Nothing is between fingertips that only swing: the grasp begins at once.
+            3 => Request::SetParameter { parameter: Parameter::CLOSING_SPEED, index: 0, value: 0.0 },
             5 => Request::Command(Command::Arm),
             10 => Request::Command(Command::Grasp(Grasp::CONFIGURED)),
             _ => Request::Heartbeat,
@@ -204,7 +209,7 @@ fn whole_tick(
         if tick < settle {
             continue;
         }
-        if outputs.record.mode != Mode::Grasping {
+        if outputs.record.mode != Mode::Carrying {
             return Err("the hand does not grasp");
         }
         figures.tick = figures.tick.max(instructions.saturating_sub(idle));

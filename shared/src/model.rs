@@ -101,9 +101,7 @@ pub fn decode<const J: usize, const F: usize>(bytes: &[u8]) -> Result<Params<J, 
     let postures = read_postures(&mut reader)?;
     let config = read_config(&mut reader, hand.joint_count())?;
     match reader.finalize() {
-        Ok([]) => Params::new(hand, &config)
-            .and_then(|params| params.with_postures(postures))
-            .map_err(ModelError::Parameter),
+        Ok([]) => Params::of(hand, postures, &config).map_err(ModelError::Parameter),
         _ => Err(ModelError::Malformed),
     }
 }

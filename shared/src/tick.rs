@@ -122,29 +122,39 @@ impl<const J: usize, const F: usize> Params<J, F> {
     /// # Errors
     /// The first parameter that is wrong, with its joint and the reason.
     pub fn new(hand: Hand<f32, J, F>, config: &Config<J>) -> Result<Self, ParameterError> {
-        let postures = Postures::default();
-        Ok(Self { prepared: Prepared::new(&hand, false, config)?, file: *config, changed: 0, postures, hand })
+        Self::of(hand, Postures::default(), config)
     }
 
     /// The same with named postures.
     ///
     /// # Errors
-    /// One has not an angle for each joint, or one that is beyond its range.
-    pub fn with_postures(self, postures: Postures<J>) -> Result<Self, ParameterError> {
+    /// As [`Self::new`], or a posture has not an angle for each joint, or one that is beyond its range.
+    #[inline(never)]
+    pub fn of(
+        hand: Hand<f32, J, F>,
+        postures: Postures<J>,
+        config: &Config<J>,
+    ) -> Result<Self, ParameterError> {
         let fails = |reason| Err(ParameterError { parameter: "posture".into(), joint: None, reason });
         for posture in &postures {
-            if posture.angles_rad.len() != self.hand.joint_count() {
+            if posture.angles_rad.len() != hand.joint_count() {
                 return fails("has to have an angle for each joint");
             }
             let mut angles = posture.angles_rad.iter().enumerate();
-            if !angles.all(|(k, &angle_rad)| self.is_within(k, angle_rad)) {
+            if !angles.all(|(k, &angle_rad)| is_within(&hand, config, k, angle_rad)) {
                 return fails("has to be within the joints' ranges, and off their end stops");
             }
         }
-        let file = self.file;
-        let mut params = Self { postures, ..self };
-        params.configure(&file)?;
-        Ok(params)
+        let prepared = Prepared::new(&hand, has_open(&postures), config)?;
+        Ok(Self { prepared, file: *config, changed: 0, postures, hand })
+    }
+
+    /// The same with named postures.
+    ///
+    /// # Errors
+    /// As [`Self::of`].
+    pub fn with_postures(self, postures: Postures<J>) -> Result<Self, ParameterError> {
+        Self::of(self.hand, postures, &self.file)
     }
 
     /// The named postures.
@@ -154,10 +164,7 @@ impl<const J: usize, const F: usize> Params<J, F> {
 
     /// Returns `true` if a joint may be moved to an angle, rad: within its range, and off its end stops.
     fn is_within(&self, joint: usize, angle_rad: f32) -> bool {
-        let (lower, upper) = self.hand.range_rad(joint);
-        let margins = self.config().limits.stop_margin_rad.as_ref();
-        let margin = margins.and_then(|margins| margins.get(joint)).copied().unwrap_or(0.0);
-        angle_rad >= lower + margin && angle_rad <= upper - margin
+        is_within(&self.hand, self.config(), joint, angle_rad)
     }
 
     /// Exchanges the configuration; a hand in motion would jump.
@@ -165,13 +172,8 @@ impl<const J: usize, const F: usize> Params<J, F> {
     /// # Errors
     /// As [`Self::new`]; nothing changes then.
     pub fn configure(&mut self, config: &Config<J>) -> Result<(), ParameterError> {
-        self.prepared = Prepared::new(&self.hand, self.has_open(), config)?;
+        self.prepared = Prepared::new(&self.hand, has_open(&self.postures), config)?;
         Ok(())
-    }
-
-    /// Returns `true` if there is a posture to open to.
-    fn has_open(&self) -> bool {
-        self.postures.iter().any(|posture| posture.name.as_slice() == OPEN)
     }
 
     /// The hand.
@@ -203,6 +205,24 @@ impl<const J: usize, const F: usize> Params<J, F> {
     pub fn laws(&self) -> &Laws<f32, J> {
         &self.prepared.laws
     }
+}
+
+/// Returns `true` if there is a posture to open to.
+fn has_open<const J: usize>(postures: &Postures<J>) -> bool {
+    postures.iter().any(|posture| posture.name.as_slice() == OPEN)
+}
+
+/// Returns `true` if a joint of a hand may be moved to an angle, rad: within its range, and off its end stops.
+fn is_within<const J: usize, const F: usize>(
+    hand: &Hand<f32, J, F>,
+    config: &Config<J>,
+    joint: usize,
+    angle_rad: f32,
+) -> bool {
+    let (lower, upper) = hand.range_rad(joint);
+    let margins = config.limits.stop_margin_rad.as_ref();
+    let margin = margins.and_then(|margins| margins.get(joint)).copied().unwrap_or(0.0);
+    angle_rad >= lower + margin && angle_rad <= upper - margin
 }
 
 /// The inputs of a tick.

@@ -176,7 +176,7 @@ impl<const F: usize> Closing<F> {
         for i in 0..count {
             let way = dot(&(posture.centres_m[i] - self.origins_m[i]), &self.directions[i]);
             let oldest = self.marks_m[i][(slot + 1) % MARKS];
-            if self.age % every == 0 {
+            if self.age.is_multiple_of(every) {
                 self.marks_m[i][slot] = way;
             }
             let reference = self.way_m.limited(0.0, self.lengths_m[i]);
@@ -209,8 +209,7 @@ impl<const F: usize> Closing<F> {
     pub(crate) fn torques<const J: usize>(
         &self,
         config: &ClosingConfig,
-        hand: &Hand<f32, J, F>,
-        posture: &Posture<f32, J, F>,
+        (hand, posture): (&Hand<f32, J, F>, &Posture<f32, J, F>),
         speeds_rad_s: &[f32; J],
         share: f32,
         period: Period,

@@ -157,7 +157,8 @@ impl<T: Real, const J: usize, const F: usize> Hand<T, J, F> {
             before = JointPose { chain, sine, cosine, origin_m };
             posture.joints[k] = before;
         }
-        for (i, fingertip) in self.fingertips.iter().take(self.fingertip_count).enumerate() {
+        for i in 0..self.fingertip_count.min(F) {
+            let fingertip = &self.fingertips[i];
             if let Some((joint, axes)) = posture.at(fingertip.link) {
                 let centre = turn_vector(axes, &(joint.origin_m + joint.turned(&fingertip.offset_m)));
                 let attitude = turn_about_z(axes, joint.sine, joint.cosine);

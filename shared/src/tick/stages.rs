@@ -217,8 +217,7 @@ fn hold<const J: usize, const F: usize>(params: &Params<J, F>, state: &mut State
             *period,
             (hand, posture),
             latch,
-            stiffness_n_m,
-            up,
+            (stiffness_n_m, up),
             &mut cycle.held,
         )
     } else {
@@ -276,7 +275,7 @@ pub(super) fn torques<const J: usize, const F: usize>(
         let (closing, speeds_rad_s) = (&config.cycle.closing, &motion.speeds_rad_s);
         let hand = &params.hand;
         let followed =
-            cycle.closing.torques(closing, hand, posture, speeds_rad_s, share, *period, &mut closing_nm);
+            cycle.closing.torques(closing, (hand, posture), speeds_rad_s, share, *period, &mut closing_nm);
         (account.way_share, account.way_potential_j) = (share, followed.potential_j);
         account.fed_j += followed.fed_j;
         for ((torque, closing), is_trunk) in torques_nm.iter_mut().zip(closing_nm).zip(trunk) {
