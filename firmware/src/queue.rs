@@ -37,6 +37,7 @@ impl From<HandReply> for Answer {
 }
 
 /// A message that the hand sends unasked.
+#[expect(clippy::large_enum_variant, reason = "most of them are records, and there is no heap")]
 pub enum Telemetry {
     /// The record of a tick, and its form.
     Record(Record<JOINTS>, Form),

@@ -138,8 +138,6 @@ pub struct Frame<T, const F: usize> {
 impl<T: Real, const F: usize> Frame<T, F> {
     /// Returns the frame of fingertips that stand like this, from a rotation that is nearly theirs: one step of Newton's
     /// method, which squares what is left of the error.
-    // Not inlined: it is called for the fingertips' centres, and for the points where they touched.
-    #[inline(never)]
     pub fn seen<const J: usize, const K: usize>(
         hand: &Hand<T, J, F>,
         points_m: &[Vector3<T>; F],
@@ -148,35 +146,12 @@ impl<T: Real, const F: usize> Frame<T, F> {
     ) -> Self {
         let count = hand.fingertip_count();
         let share_of_one = T::one() / T::from_i32(count as i32);
-        let centroid = centroid_m(points_m, count, share_of_one);
-        let mut arms_m = latch.arms_m.map(|arm| nearly.turn(&arm));
-        let mut h = Matrix3::zeros();
-        let mut off = Vector3::zeros();
-        for (point, arm) in points_m.iter().zip(&arms_m).take(count) {
-            let offset = point - centroid;
-            off += cross(arm, &offset);
-            h += Matrix3::new(
-                offset.x * arm.x,
-                offset.x * arm.y,
-                offset.x * arm.z,
-                offset.y * arm.x,
-                offset.y * arm.y,
-                offset.y * arm.z,
-                offset.z * arm.x,
-                offset.z * arm.y,
-                offset.z * arm.z,
-            );
+        let (pose, spread_1_m2) = pose_of(points_m, latch, nearly, count, share_of_one);
+        let mut arms_m = latch.arms_m;
+        for arm in arms_m.iter_mut().take(count) {
+            *arm = pose.turn.turn(arm);
         }
-        let spread_1_m2 = spread(&h);
-        let step = times(&spread_1_m2, &off);
-        // A rotation that is off by half a radian is of fingertips that came together: no step from there is small.
-        let most = T::from_f64(0.1);
-        let step = step.map(|v| v.limited(-most, most));
-        let turn = nearly.nudged(&step);
-        for (arm, latched) in arms_m.iter_mut().zip(&latch.arms_m).take(count) {
-            *arm = turn.turn(latched);
-        }
-        Self { pose: Pose { way_m: centroid - latch.centroid_m, turn }, arms_m, spread_1_m2, share_of_one }
+        Self { pose, arms_m, spread_1_m2, share_of_one }
     }
 
     /// Returns the forces at the fingertips that make up a force and a moment about the frame's origin, N.
@@ -194,6 +169,41 @@ impl<T: Real, const F: usize> Frame<T, F> {
         }
         (sum * self.share_of_one, times(&self.spread_1_m2, &moment))
     }
+}
+
+/// Returns the pose of points since the latch, from a rotation that is nearly theirs, and `A^-1`, 1/m^2.
+// Not inlined: it is called for the fingertips' centres, and for the points where they touched.
+#[inline(never)]
+pub(crate) fn pose_of<T: Real, const K: usize, const F: usize>(
+    points_m: &[Vector3<T>; F],
+    latch: &Latch<T, K, F>,
+    nearly: &Turn<T>,
+    count: usize,
+    share_of_one: T,
+) -> (Pose<T>, Matrix3<T>) {
+    let centroid = centroid_m(points_m, count, share_of_one);
+    let mut h = Matrix3::zeros();
+    let mut off = Vector3::zeros();
+    for (point, latched) in points_m.iter().zip(&latch.arms_m).take(count) {
+        let (offset, arm) = (point - centroid, nearly.turn(latched));
+        off += cross(&arm, &offset);
+        h += Matrix3::new(
+            offset.x * arm.x,
+            offset.x * arm.y,
+            offset.x * arm.z,
+            offset.y * arm.x,
+            offset.y * arm.y,
+            offset.y * arm.z,
+            offset.z * arm.x,
+            offset.z * arm.y,
+            offset.z * arm.z,
+        );
+    }
+    let spread_1_m2 = spread(&h);
+    // A rotation that is off by more is of fingertips that came together: no step from there is small.
+    let most = T::from_f64(0.1);
+    let step = times(&spread_1_m2, &off).map(|v| v.limited(-most, most));
+    (Pose { way_m: centroid - latch.centroid_m, turn: nearly.nudged(&step) }, spread_1_m2)
 }
 
 /// Returns the mean of the first points, m.
@@ -355,7 +365,11 @@ impl<T: Real> FrameLaw<T> {
             turn: frame.pose.turn.inverse().then(&target.turn),
         };
         let (pull_n, turn_nm, potentials_j) = self.pull(&off(&held.target), gains);
-        let (_, _, before_j) = self.pull(&off(&held.target_before), gains);
+        let before_j = if held.target == held.target_before {
+            potentials_j
+        } else {
+            self.pull(&off(&held.target_before), gains).2
+        };
         let velocities_m_s = hand.fingertip_velocities(posture, speeds_rad_s);
         let (velocity, turning) = frame.velocity(&velocities_m_s, count);
         let damping = [gains[0] * self.config.damping_s, gains[1] * self.config.turn_damping_s];

@@ -250,7 +250,9 @@ impl<const F: usize> Carry<F> {
         for ((point, (attitude, latched)), touch) in touched {
             *point += turn_vector(&product_transposed(attitude, latched), touch);
         }
-        let object = Frame::seen(hand, &points_m, &self.points, &self.object_turn).pose;
+        let count = hand.fingertip_count();
+        let (object, _) =
+            frame::pose_of(&points_m, &self.points, &self.object_turn, count, 1.0 / count as f32);
         self.object_turn = object.turn;
         let place = self.path.place();
         let [px, py, pz, rx, ry, rz, bx, by, bz] = place.value;
@@ -318,7 +320,7 @@ impl<const F: usize> Carry<F> {
             }
         }
         let target_before = self.target;
-        self.target = Pose { way_m, turn: goal.then(&Turn::by(&self.correction_rad)) };
+        self.target = Pose { way_m, turn: goal.nudged(&self.correction_rad) };
         *held = Held { frame, object, target: self.target, target_before };
         carried
     }
