@@ -26,10 +26,12 @@ use crate::hand::Hand;
 use crate::joints::MotorConfig;
 use crate::ledger::Entry;
 use crate::limit::{LimitConfig, Limiting, Limits};
+use crate::math::norm;
 use crate::parameter::ParameterError;
 use crate::period::Period;
 use crate::supervisor::{Drive, Mode, Ramps, Stages, SupervisorConfig};
 use crate::telemetry::{List, Record};
+use nalgebra::Vector3;
 
 /// Everything that can be set, in SI units.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -77,6 +79,8 @@ struct Prepared<const J: usize> {
     ramps: Ramps,
     /// Joints that move several fingertips.
     trunk: [bool; J],
+    /// The direction against gravity; `None` where it is not told.
+    up: Option<Vector3<f32>>,
 }
 
 impl<const J: usize> Prepared<J> {
@@ -108,6 +112,10 @@ impl<const J: usize> Prepared<J> {
             watch: config.faults.prepare(hand, &estimator, period)?,
             ramps: config.supervisor.prepare(period)?.with(has, retreat_ticks),
             trunk,
+            up: config.laws.hold.gravity_m_s2.and_then(|gravity| {
+                let length = norm(&gravity);
+                (length > 0.0).then(|| gravity * (-1.0 / length))
+            }),
             period,
             period_s: period.seconds(),
             estimator,

@@ -540,7 +540,7 @@ fn instructions_are_within_limits_and_as_written_down() {
     const MOST: [(&str, u64); 6] = [
         ("law_gravity_off", 2_600),
         ("law_gravity_on", 3_400),
-        ("tick", 12_000),
+        ("tick", 12_500),
         ("encode_full", 4_000),
         ("encode_input", u64::MAX),
         ("save", u64::MAX),

@@ -271,9 +271,9 @@ impl<const F: usize> Carry<F> {
             let about = about + latch.frame.centroid_m - self.points.centroid_m;
             let left_m = way + about - goal.turn(&about) - upwards * self.sunk_m - object.way_m;
             self.integral_m += left_m * (INTEGRAL_1_S * period_s);
-            let length = norm(&self.integral_m);
-            if length > most {
-                self.integral_m *= if length > 0.0 { most / length } else { 0.0 };
+            let square = dot(&self.integral_m, &self.integral_m);
+            if square > most * most {
+                self.integral_m *= most / square.square_root();
             }
             let left = object.turn.inverse().then(&goal).shorter().v * 2.0;
             let rate = config.correction_hz * (core::f32::consts::TAU * period_s);

@@ -185,7 +185,7 @@ fn close<const J: usize, const F: usize>(
 
 #[inline(never)]
 fn hold<const J: usize, const F: usize>(params: &Params<J, F>, state: &mut State<J, F>) -> Option<Noticed> {
-    let Prepared { config, period, laws, ramps, .. } = &params.prepared;
+    let Prepared { config, period, up, ramps, .. } = &params.prepared;
     let State { cycle, posture, motion, supervisor, latch, grasp, .. } = state;
     let hand = &params.hand;
     if supervisor.drive(ramps) == Drive::Close {
@@ -210,14 +210,12 @@ fn hold<const J: usize, const F: usize>(params: &Params<J, F>, state: &mut State
     let carried = if carries {
         let stiffness_n_m =
             if mode == Mode::Carrying || mode == Mode::PuttingDown { grasp.frame[0] } else { 0.0 };
-        let up = laws.config().hold.gravity_m_s2.map(|gravity| -gravity);
-        let up = up.filter(|up| norm(up) > 0.0).map(|up| up * (1.0 / norm(&up)));
         cycle.carry.advance(
             &config.cycle.carrying,
             *period,
             (hand, posture),
             latch,
-            (stiffness_n_m, up),
+            (stiffness_n_m, *up),
             &mut cycle.held,
         )
     } else {
