@@ -12,6 +12,7 @@ use blindgrasp_shared::fault::Fault;
 use blindgrasp_shared::link::message::Reply;
 use blindgrasp_shared::parameters::Parameter;
 use blindgrasp_shared::supervisor::Mode;
+use blindgrasp_shared::telemetry::burst;
 use blindgrasp_shared::telemetry::snapshot::Collector;
 use nix::sys::signal::{Signal, kill};
 use nix::unistd::Pid;
@@ -401,8 +402,8 @@ fn a_script_is_recorded_with_its_grasp_a_fault_and_what_was_caught_around_it() {
     let (mut console, mut stdin) = console(&link, &["--out", out.to_str().expect("UTF-8")]);
     writeln!(stdin, "arm\ngrasp").expect("the lines are taken");
     console.said_until("fault 1: ");
-    // Its 256 records are read out in the 5 s that the line has time for.
-    wait_until("the burst is read", || so_far(&out).is_some_and(|content| content.burst == 256));
+    // Its records are read out in the 5 s that the line has time for.
+    wait_until("the burst is read", || so_far(&out).is_some_and(|content| content.burst == BURST));
     writeln!(stdin, "clear\nset force_n 4").expect("the lines are taken");
     console.said_until("force_n = 4: done\n");
     let snapshots = so_far(&out).map_or(0, |content| content.snapshots.len());
@@ -422,7 +423,7 @@ fn a_script_is_recorded_with_its_grasp_a_fault_and_what_was_caught_around_it() {
     assert!((1499..=1501).contains(&grasping), "{grasping} ticks");
     let fault = content.records.iter().find_map(|decoded| decoded.record.fault).expect("a fault");
     assert_eq!(fault.fault, Fault::SampleMissing);
-    assert_eq!(content.burst, 256);
+    assert_eq!(content.burst, BURST);
     // After the parameter was set: a state to go on from, at once.
     // The one before may have been broken off for it.
     assert!(content.snapshots.windows(2).any(|pair| pair[1].wrapping_sub(pair[0]) % 1000 > 0));
@@ -430,6 +431,9 @@ fn a_script_is_recorded_with_its_grasp_a_fault_and_what_was_caught_around_it() {
     assert!(angles + 200 > content.records.len(), "{angles} records with angles");
     assert_replayed_and_exported(&out, &content.records);
 }
+
+/// Records around a fault.
+const BURST: usize = burst::BEFORE + burst::AFTER;
 
 /// A sign and a zero that are set while it is recorded: what was computed with them is replayed to the bit.
 #[test]
