@@ -171,12 +171,12 @@ fn a_hand_that_begins_open_touches_nothing() {
         (
             "pick-cube",
             &["pose.position_m.3=0.13"],
-            "scenes/pick-cube.toml:26: plant.table.1.point_m: the object is 5.000 mm inside the table; move the table or the object's pose",
+            "scenes/pick-cube.toml:30: plant.table.1.point_m: the object is 5.000 mm inside the table; move the table or the object's pose",
         ),
         (
             "pick-cube",
             &["pose.position_m.3=0.03"],
-            "scenes/pick-cube.toml:21: plant.links: the palm (capsule 3) is 4.000 mm inside the object at the start; move contacts or \
+            "scenes/pick-cube.toml:25: plant.links: the palm (capsule 3) is 4.000 mm inside the object at the start; move contacts or \
              object, correct the hand's capsules, or set it to false",
         ),
         (
