@@ -187,7 +187,7 @@ impl<T: Real, const J: usize, const F: usize> Hand<T, J, F> {
     }
 
     /// Velocities of the fingertips' centres, `J_i dq`, m/s: from each to the base, chain by chain, as
-    /// [`push`](Self::push) goes, whose transpose it is.
+    /// `push` goes, whose transpose it is.
     pub fn fingertip_velocities(&self, posture: &Posture<T, J, F>, speeds_rad_s: &[T; J]) -> [Vector3<T>; F] {
         let mut velocities = [Vector3::zeros(); F];
         let fingertips = self.prepared_fingertips().iter().zip(&posture.centres_m);
