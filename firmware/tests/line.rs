@@ -343,7 +343,7 @@ fn bytes_a_millisecond() {
             assert!(bytes_per_ms <= most);
             if way == Way::Dma {
                 // All of the line, or all that there is to send.
-                let all = bytes_per_ms > 0.99 * most || records > 1990;
+                let all = bytes_per_ms > 0.98 * most || records > 1990;
                 assert!(all, "{mbaud} Mbaud: {bytes_per_ms} bytes/ms");
             }
         }
@@ -358,8 +358,10 @@ fn at_3_mbaud_no_record_is_lost_and_a_fifth_is_to_spare() {
     let share = f64::min(0.8, longest as f64 / 240.0);
     let outcome = run(Way::Dma, share * 3e6, 60_000, Load::Asked);
     println!("{JOINTS} joints, {:.0} % of 3 Mbaud, 60 s: {outcome:?}", 100.0 * share);
-    assert_eq!((outcome.missing, outcome.dropped, outcome.inputs), (0, 0, 0));
-    assert!(outcome.records >= 60_000 - 5);
+    assert_eq!((outcome.missing, outcome.dropped), (0, 0));
+    // While a snapshot of 16 joints leaves, some ticks are told of by their inputs.
+    assert!(outcome.inputs <= if JOINTS > 12 { 600 } else { 0 }, "{} inputs", outcome.inputs);
+    assert!(outcome.records + outcome.inputs >= 60_000 - 5);
     assert!(outcome.idle_share > 0.2, "the link's time: {}", outcome.idle_share);
 }
 
