@@ -6,8 +6,9 @@
 //!   a slow one turns the target until the *object* has turned by what was asked for.
 //! - **Weight**: a bounded integral of the way that is left, of the object by the same points, shifts the target until it is where it
 //!   is to be.
-//! - **Weighing**: the target goes slowly up and down again; the mean of the force on both ways is the weight, as what the joints'
-//!   friction takes has the opposite sign on the other way.
+//! - **Weighing**: the target goes slowly up and down again. The work that the frame's pull does on the ways, over the height by which
+//!   the *object* was lifted, is its weight: a fingertip that rolls lifts it by more than itself. What the joints' friction takes
+//!   has the opposite sign on the other way, and the springs of the laws give back what they took.
 //! - **Putting down**: the target sinks until the frame presses on something below, or to a stated depth below the latch's height.
 //!   Then the target is where the frame is.
 
@@ -88,6 +89,8 @@ const CORRECTION_MOST_RAD: f32 = 0.35;
 /// Height of the stroke of weighing, m, and its time, ms: half of it up, half down.
 const STROKE_M: f32 = 6e-3;
 const STROKE_MS: u32 = 2000;
+/// Least height on both ways together by which an object has to be lifted to be weighed, m.
+const LEAST_LIFT_M: f32 = 1e-3;
 /// Time before the stroke and after it in which the frame comes to rest, ms.
 const SETTLE_MS: u32 = 300;
 /// By how much the fingertips' mean distance from their centroid may shrink while they hold something, m.
@@ -137,9 +140,12 @@ pub(crate) struct Carry<const F: usize> {
     target: Pose<f32>,
     work: Work,
     age: u32,
-    /// Sum of what was measured, and its number.
-    sum_n: f32,
-    count: u32,
+    /// Work that the frame's pull did on what was measured of the stroke, J, and the height by which it lifted the object, m: up
+    /// and down counted alike.
+    work_j: f32,
+    lifted_m: f32,
+    /// Heights of frame and object in the tick before, m.
+    heights_m: [f32; 2],
     /// Depth to which the target has sunk, m.
     sunk_m: f32,
     /// The last weight, N.
@@ -161,8 +167,9 @@ impl<const F: usize> Carry<F> {
             target: Pose::latched(),
             work: Work::Follow,
             age: 0,
-            sum_n: 0.0,
-            count: 0,
+            work_j: 0.0,
+            lifted_m: 0.0,
+            heights_m: [0.0; 2],
             sunk_m: 0.0,
             weight_n: 0.0,
         }
@@ -221,7 +228,7 @@ impl<const F: usize> Carry<F> {
 
     /// Begins to weigh.
     pub(crate) fn weigh(&mut self) {
-        (self.work, self.age, self.sum_n, self.count) = (Work::Weigh, 0, 0.0, 0);
+        (self.work, self.age, self.work_j, self.lifted_m) = (Work::Weigh, 0, 0.0, 0.0);
     }
 
     /// Begins to put down.
@@ -254,8 +261,7 @@ impl<const F: usize> Carry<F> {
         let (object, _) =
             frame::pose_of(&points_m, &self.points, &self.object_turn, count, 1.0 / count as f32);
         self.object_turn = object.turn;
-        let place = self.path.place();
-        let [px, py, pz, rx, ry, rz, bx, by, bz] = place.value;
+        let [px, py, pz, rx, ry, rz, bx, by, bz] = self.path.value();
         let (way, about) = (Vector3::new(px, py, pz), Vector3::new(bx, by, bz));
         let goal = Turn::by(&Vector3::new(rx, ry, rz));
         let mut way_m = way + about - goal.turn(&about);
@@ -265,8 +271,9 @@ impl<const F: usize> Carry<F> {
         let mut carried = if !was_over && self.path.is_over() { Carried::Arrived } else { Carried::On };
         let upwards = up.unwrap_or(Vector3::zeros());
         way_m -= upwards * self.sunk_m;
-        if self.work == Work::Follow {
-            let most = if stiffness_n_m > 0.0 { config.integral_n / stiffness_n_m } else { 0.0 };
+        // At its full force only: while it is let go, nothing is to be made up for.
+        if self.work == Work::Follow && stiffness_n_m > 0.0 {
+            let most = config.integral_n / stiffness_n_m;
             // From the middle of the points of touch, not from that of the centres.
             let about = about + latch.frame.centroid_m - self.points.centroid_m;
             let left_m = way + about - goal.turn(&about) - upwards * self.sunk_m - object.way_m;
@@ -294,18 +301,26 @@ impl<const F: usize> Carry<F> {
                 way_m += upwards * (STROKE_M * 0.5 * (1.0 - cosine));
                 // The middle half of the way up, and of that down.
                 let eighth = at * 8 / stroke;
+                let heights_m = [dot(&frame.pose.way_m, &upwards), dot(&object.way_m, &upwards)];
                 if matches!(eighth, 1 | 2 | 5 | 6) {
-                    self.sum_n += pull_n(&way_m);
-                    self.count += 1;
+                    let sign = if eighth < 4 { 1.0 } else { -1.0 };
+                    let [frame_m, object_m] = self.heights_m;
+                    self.work_j += sign * pull_n(&way_m) * (heights_m[0] - frame_m);
+                    self.lifted_m += sign * (heights_m[1] - object_m);
                 }
+                self.heights_m = heights_m;
                 if at >= stroke + settle {
-                    self.weight_n = self.sum_n / self.count.max(1) as f32;
+                    // Without a way there is no weight.
+                    let is_lifted = self.lifted_m > LEAST_LIFT_M;
+                    self.weight_n = if is_lifted { self.work_j / self.lifted_m } else { 0.0 };
                     self.work = Work::Follow;
                     carried = Carried::Weighed;
                 }
             }
             Work::PutDown => {
-                self.sunk_m += config.put_down_m_s * period_s;
+                if stiffness_n_m > 0.0 {
+                    self.sunk_m += config.put_down_m_s * period_s;
+                }
                 let is_on_ground = pull_n(&way_m) < -config.put_down_n;
                 let is_deep = dot(&way_m, &upwards) < -config.put_down_m;
                 if is_on_ground || is_deep {
@@ -353,10 +368,10 @@ impl<const F: usize> Carry<F> {
         }
         self.path.save(9, to)?;
         to.u8(self.work as u8)?;
-        [self.age, self.count].into_iter().try_for_each(|number| to.u32(number))?;
-        [self.least_m2, self.sum_n, self.sunk_m, self.weight_n]
-            .into_iter()
-            .try_for_each(|number| to.f32(number))
+        to.u32(self.age)?;
+        to.f32s(&self.heights_m, 2)?;
+        let Self { least_m2, work_j, lifted_m, sunk_m, weight_n, .. } = *self;
+        to.f32s(&[least_m2, work_j, lifted_m, sunk_m, weight_n], 5)
     }
 
     pub(crate) fn load(fingertips: usize, from: &mut Loader<'_>) -> Result<Self, SnapshotError> {
@@ -379,8 +394,10 @@ impl<const F: usize> Carry<F> {
             2 => Work::PutDown,
             _ => return Err(SnapshotError::Malformed("no work has this number")),
         };
-        (carry.age, carry.count) = (from.u32()?, from.u32()?);
-        for number in [&mut carry.least_m2, &mut carry.sum_n, &mut carry.sunk_m, &mut carry.weight_n] {
+        carry.age = from.u32()?;
+        from.f32s(&mut carry.heights_m, 2)?;
+        let Self { least_m2, work_j, lifted_m, sunk_m, weight_n, .. } = &mut carry;
+        for number in [least_m2, work_j, lifted_m, sunk_m, weight_n] {
             *number = from.f32()?;
         }
         Ok(carry)

@@ -44,6 +44,23 @@ impl<const N: usize> Path<N> {
         self.age = self.age.saturating_add(1);
     }
 
+    /// Returns the value of this tick alone.
+    pub(crate) fn value(&self) -> [f32; N] {
+        if self.is_over() {
+            return self.to;
+        }
+        let s = self.age as f32 / self.ticks as f32;
+        let (s2, s3) = (s * s, s * s * s);
+        let (s4, s5) = (s2 * s2, s2 * s3);
+        let way = 10.0 * s3 - 15.0 * s4 + 6.0 * s5;
+        let speed = s - 6.0 * s3 + 8.0 * s4 - 3.0 * s5;
+        let bend = 0.5 * s2 - 1.5 * s3 + 1.5 * s4 - 0.5 * s5;
+        core::array::from_fn(|k| {
+            let length = self.to[k] - self.from[k];
+            self.from[k] + length * way + self.speed[k] * speed + self.acceleration[k] * bend
+        })
+    }
+
     /// Returns the place of this tick.
     pub(crate) fn place(&self) -> Place<N> {
         let zero = [0.0; N];
