@@ -11,7 +11,7 @@ use crate::control::Control;
 use crate::link::MOST_SENT;
 use crate::model::{FINGERS, JOINTS, params};
 use crate::semihosting::File;
-use blindgrasp_shared::command::{Command, Grasp};
+use blindgrasp_shared::command::{Command, Grasp, Move};
 use blindgrasp_shared::control::{Held, Latch, LawsConfig, Stance};
 use blindgrasp_shared::device::Inputs;
 use blindgrasp_shared::fault::Raised;
@@ -168,7 +168,15 @@ fn law(
     Ok(most)
 }
 
-/// The whole tick with its request, in a grasp, and the encoding of its record.
+/// A way that takes longer than what is measured.
+const WAY: Move = Move {
+    position_m: [0.01, 0.01, 0.01],
+    turn_rad: [0.1, 0.2, 0.1],
+    about_m: [0.01, 0.0, 0.02],
+    time_ms: 60_000,
+};
+
+/// The whole tick with its request, while what is grasped is moved, and the encoding of its record.
 fn whole_tick(
     counter: &Counter,
     params: &HandParams,
@@ -187,6 +195,8 @@ fn whole_tick(
             3 => Request::SetParameter { parameter: Parameter::CLOSING_SPEED, index: 0, value: 0.0 },
             5 => Request::Command(Command::Arm),
             10 => Request::Command(Command::Grasp(Grasp::CONFIGURED)),
+            // On its way a target costs the most.
+            _ if tick == settle => Request::Command(Command::Move(WAY)),
             _ => Request::Heartbeat,
         };
         let packet = Packet { session, sequence: tick as u16, request };

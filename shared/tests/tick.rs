@@ -2,7 +2,8 @@
 
 use crate::common;
 
-use blindgrasp_shared::command::{Answer, Command, Grasp, Refusal};
+use blindgrasp_shared::command::{Answer, Command, Grasp, Move, Refusal};
+use blindgrasp_shared::cycle::ClosingConfig;
 use blindgrasp_shared::event::{Event, Events};
 use blindgrasp_shared::fault::{Fault, FaultConfig, Raised};
 use blindgrasp_shared::limit::{Limit, LimitConfig};
@@ -809,4 +810,118 @@ fn a_supply_that_is_too_low_is_a_fault_until_it_is_not() {
         assert_eq!(refused(&tick(&params, &mut state, &clear.with(low))), Some(Refusal::FaultPersists));
         assert_eq!(refused(&tick(&params, &mut state, &clear)), None);
     }
+}
+
+/// Commands of the cycle that can't be done: each is refused by name, and no torque changes for it.
+#[test]
+fn commands_of_the_cycle_that_can_not_be_done_are_refused_by_name() {
+    let way = Move::default();
+    let moving = |position_m: [f32; 3], turn_rad: [f32; 3], time_ms| {
+        Command::Move(Move { position_m, turn_rad, time_ms, ..Move::default() })
+    };
+    let posture = |posture, time_ms| Command::Posture { posture, time_ms };
+    let (none, nan) = ([0.0; 3], f32::NAN);
+    let cases = [
+        (Mode::Armed, Command::Move(way), Refusal::NotCarrying),
+        (Mode::Armed, Command::PutDown, Refusal::NotCarrying),
+        (Mode::Armed, Command::Weigh, Refusal::NotCarrying),
+        (Mode::Armed, posture(None, 0), Refusal::NoPath),
+        (Mode::Disarmed, posture(None, 0), Refusal::NotArmed),
+        (Mode::Moving, posture(Some(3), 0), Refusal::NoSuchPosture),
+        (Mode::Moving, Command::Aim { joint: 12, angle_rad: 0.0 }, Refusal::NoSuchJoint),
+        (Mode::Moving, Command::Aim { joint: 0, angle_rad: nan }, Refusal::NotFinite),
+        // Within the range of 2 rad, but in the end stop's margin.
+        (Mode::Moving, Command::Aim { joint: 0, angle_rad: 1.95 }, Refusal::BeyondRange),
+        (Mode::Closing, posture(None, 0), Refusal::Closing),
+        (Mode::Closing, Command::Arm, Refusal::Closing),
+        (Mode::Carrying, posture(None, 0), Refusal::Grasping),
+        (Mode::Carrying, moving([nan, 0.0, 0.0], none, 0), Refusal::NotFinite),
+        (Mode::Carrying, moving(none, [0.0, f32::INFINITY, 0.0], 0), Refusal::NotFinite),
+        (Mode::Carrying, moving([0.06, 0.0, 0.0], none, 0), Refusal::TooFar),
+        (Mode::Carrying, moving(none, [0.0, 0.9, 0.0], 0), Refusal::TooFar),
+        (Mode::Carrying, moving([0.04, 0.0, 0.0], none, 100), Refusal::TooFast),
+        (Mode::Carrying, moving(none, [0.0, 0.5, 0.0], 100), Refusal::TooFast),
+        (Mode::PuttingDown, Command::Move(way), Refusal::PuttingDown),
+        (Mode::PuttingDown, Command::Weigh, Refusal::PuttingDown),
+    ];
+    for (mode, command, refusal) in cases {
+        let params = params_for(mode);
+        let mut state = in_mode(&params, mode);
+        let mut other = state.clone();
+        let counts = counts_in(mode);
+        let output = tick(&params, &mut state, &Input::counts(&counts, Some(command)));
+        let refused = output.record.answer.and_then(|answer| answer.refused);
+        assert_eq!(refused, Some(refusal), "{mode:?}, {command:?}");
+        let without = tick(&params, &mut other, &Input::counts(&counts, None));
+        assert_eq!(output.torques_nm, without.torques_nm, "{mode:?}, {command:?}");
+        assert_eq!(output.record.mode, without.record.mode, "{mode:?}, {command:?}");
+    }
+    let mut config = cycle_config();
+    config.cycle.closing = ClosingConfig::AT_ONCE;
+    config.laws.hold.gravity_m_s2 = None;
+    let params = params(&config);
+    let mut state = State::new();
+    drive_at(&apart_counts(), &params, &mut state, &[Command::Arm, GRASP], 150);
+    for command in [Command::Weigh, Command::PutDown] {
+        let output = tick(&params, &mut state, &Input::counts(&apart_counts(), Some(command)));
+        let refused = output.record.answer.and_then(|answer| answer.refused);
+        assert_eq!(refused, Some(Refusal::NoGravity), "{command:?}");
+    }
+}
+
+/// A million ticks of commands in any order, of joints that shake, in all modes: no torque changes by more than its slew limit, but to
+/// nothing where there is to be none; and `Stop` takes it away from everywhere.
+#[test]
+fn whatever_is_commanded_no_torque_jumps() {
+    let params: TestParams = params(&cycle_config());
+    let (home, mut counts) = (apart_counts::<12>(), apart_counts::<12>());
+    let mut state = State::new();
+    let mut last_nm = [0.0_f32; 12];
+    let mut random = 1_u64;
+    let mut below = |bound: u32| {
+        random = random.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        ((random >> 32) as u32) % bound
+    };
+    let mut ticks_in = [0_u32; 9];
+    for _ in 0..1_000_000 {
+        for (count, home) in counts.iter_mut().zip(home) {
+            *count = home + below(5) as i32 - 2;
+        }
+        let mut way = || below(200) as f32 * 1e-4 - 0.01;
+        let moving = Move {
+            position_m: [way(), way(), way()],
+            turn_rad: [10.0 * way(), 10.0 * way(), 10.0 * way()],
+            about_m: [way(), way(), way()],
+            time_ms: 0,
+        };
+        let time_ms = below(500) as u16;
+        let command = match below(4_000) {
+            0..40 => Some(Command::Arm),
+            40..60 => Some(GRASP),
+            60..70 => Some(Command::Posture { posture: None, time_ms: 0 }),
+            70..75 => Some(Command::Aim { joint: below(13) as u8, angle_rad: 100.0 * moving.position_m[0] }),
+            75..125 => Some(Command::Move(Move { time_ms, ..moving })),
+            125..175 => Some(Command::Move(moving)),
+            175..178 => Some(Command::PutDown),
+            178..181 => Some(Command::Weigh),
+            181 => Some(Command::Release),
+            182 => Some(Command::Disarm),
+            183 => Some(Command::Stop),
+            184..224 => Some(Command::ClearFault),
+            _ => None,
+        };
+        let output = tick(&params, &mut state, &Input::counts(&counts, command));
+        ticks_in[output.record.mode as usize] += 1;
+        if command == Some(Command::Stop) {
+            assert!(!output.powered && output.torques_nm == [0.0; 12]);
+        }
+        let step_nm = SLEW_NM_S as f32 * 1e-3 * 1.0001;
+        for (torque, last) in output.torques_nm.iter().zip(&last_nm) {
+            let is_off = !output.powered && *torque == 0.0;
+            assert!(is_off || (torque - last).abs() <= step_nm, "{:?}", output.record);
+        }
+        last_nm = output.torques_nm;
+    }
+    println!("ticks in each mode {ticks_in:?}");
+    assert!(ticks_in[..8].iter().all(|&ticks| ticks > 1_000), "{ticks_in:?}");
 }

@@ -12,7 +12,7 @@
 //! - **Putting down**: the target sinks until the frame presses on something below, or to a stated depth below the latch's height.
 //!   Then the target is where the frame is.
 
-use super::path::Path;
+use super::path::{Path, largest};
 use crate::bytes::{BufferTooSmall, Loader, Saver, SnapshotError};
 use crate::control::frame::{self, Frame};
 use crate::control::{Held, Latch, Pose};
@@ -218,7 +218,8 @@ impl<const F: usize> Carry<F> {
 
     /// Returns the longest ways to a target, m and rad.
     pub(crate) fn ways(&self, to: &[f32; 9]) -> (f32, f32) {
-        (self.path.longest(to, 0..3), self.path.longest(to, 3..6))
+        let [x, y, z, turn_x, turn_y, turn_z, ..] = self.path.ways(to);
+        (largest(&[x, y, z]), largest(&[turn_x, turn_y, turn_z]))
     }
 
     /// Goes to a target from now on.

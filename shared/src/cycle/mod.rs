@@ -20,7 +20,7 @@ pub use posture::{NAME_BYTES, NamedPosture, OPEN, POSTURES_MOST, Postures};
 pub(crate) use carry::{Carried, Carry};
 pub(crate) use closing::{Closed, Closing, RETREAT_MS};
 pub(crate) use moving::Moving;
-pub(crate) use path::PEAK;
+pub(crate) use path::{PEAK, largest};
 
 use crate::bytes::{BufferTooSmall, Loader, Saver, SnapshotError};
 use crate::control::Held;

@@ -25,6 +25,11 @@ pub(crate) struct Place<const N: usize> {
     pub(crate) per_tick2: [f32; N],
 }
 
+/// Returns the largest of some numbers that are not negative.
+pub(crate) fn largest(values: &[f32]) -> f32 {
+    values.iter().fold(0.0, |most: f32, &value| if value > most { value } else { most })
+}
+
 /// Largest speed of a way from rest to rest, over its mean.
 pub(crate) const PEAK: f32 = 1.875;
 
@@ -106,11 +111,10 @@ impl<const N: usize> Path<N> {
         };
     }
 
-    /// Returns the longest of the ways that are left to go there, of some of the numbers.
-    pub(crate) fn longest(&self, to: &[f32; N], of: core::ops::Range<usize>) -> f32 {
-        let Place { value, .. } = self.place();
-        let ways = value.iter().zip(to).map(|(from, to)| (to - from).magnitude());
-        ways.skip(of.start).take(of.len()).fold(0.0, |most: f32, way| if way > most { way } else { most })
+    /// Returns the ways that are left to go there.
+    pub(crate) fn ways(&self, to: &[f32; N]) -> [f32; N] {
+        let from = self.value();
+        core::array::from_fn(|k| (to[k] - from[k]).magnitude())
     }
 
     pub(crate) fn save(&self, count: usize, to: &mut Saver<'_>) -> Result<(), BufferTooSmall> {

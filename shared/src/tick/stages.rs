@@ -3,9 +3,9 @@
 use super::{Params, Prepared, State};
 use crate::command::{Command, Move, Refusal};
 use crate::control::{Account, Latch};
-use crate::cycle::{Carried, Closed, Cycle, Moving, Notice, Noticed, OPEN, PEAK};
+use crate::cycle::{Carried, Closed, Cycle, Moving, Notice, Noticed, OPEN, PEAK, largest};
 use crate::estimate::Motion;
-use crate::hand::{Posture, Turn};
+use crate::hand::Posture;
 use crate::math::{Real, norm};
 use crate::period::Period;
 use crate::supervisor::{Drive, Event, Mode};
@@ -48,10 +48,10 @@ pub(super) fn object<const J: usize, const F: usize>(
                 return Some(Refusal::Weighing);
             }
             let (turn, about) = (Vector3::from(movement.turn_rad), Vector3::from(movement.about_m));
-            let way_m = Vector3::from(movement.position_m) + about - Turn::by(&turn).turn(&about);
-            // What is not finite is not within reach.
-            if !(norm(&way_m) <= carrying.reach_m && norm(&turn) <= carrying.reach_rad && norm(&about) < 1.0)
-            {
+            // A turn about a point moves the frame by no more than its arc. What is not finite is not within reach.
+            let turn_rad = norm(&turn);
+            let way_m = norm(&Vector3::from(movement.position_m)) + turn_rad * norm(&about);
+            if !(way_m <= carrying.reach_m && turn_rad <= carrying.reach_rad) {
                 return Some(Refusal::TooFar);
             }
             is_short(*period, movement.time_ms, target_ticks(params, state, &to)).then_some(Refusal::TooFast)
@@ -90,8 +90,12 @@ pub(super) fn obey<const J: usize, const F: usize>(
         Command::Posture { posture, time_ms } => state.cycle.asked = Some((posture, time_ms)),
         Command::Move(movement) => {
             let to = target(&movement);
-            let least = target_ticks(params, state, &to);
-            state.cycle.carry.turn_to(&to, least.max(ticks(params.prepared.period, movement.time_ms)));
+            // A time that is too short was refused.
+            let ticks = match movement.time_ms {
+                0 => target_ticks(params, state, &to),
+                time_ms => ticks(params.prepared.period, time_ms),
+            };
+            state.cycle.carry.turn_to(&to, ticks);
         }
         Command::PutDown if before == Mode::Carrying => state.cycle.carry.put_down(),
         Command::Weigh if !state.cycle.carry.is_weighing() => state.cycle.carry.weigh(),
@@ -307,10 +311,11 @@ fn angles_rad<const J: usize, const F: usize>(
 fn way_rad<const J: usize, const F: usize>(params: &Params<J, F>, state: &State<J, F>, to: &[f32; J]) -> f32 {
     let count = params.hand.joint_count();
     if state.cycle.begun == Mode::Moving {
-        return state.cycle.moving.path.longest(to, 0..count);
+        return largest(state.cycle.moving.path.ways(to).get(..count).unwrap_or(&[]));
     }
-    let ways = state.motion.angles_rad.iter().zip(to).take(count).map(|(from, to)| (to - from).magnitude());
-    ways.fold(0.0, |most: f32, way| if way > most { way } else { most })
+    let angles_rad = &state.motion.angles_rad;
+    let ways: [f32; J] = core::array::from_fn(|k| (to[k] - angles_rad[k]).magnitude());
+    largest(ways.get(..count).unwrap_or(&[]))
 }
 
 /// Returns the target of a movement: way, rotation vector, point that is turned about.
