@@ -73,9 +73,9 @@ pub enum Mode {
     Closing,
     /// The grasp law is at work.
     Grasping,
-    /// What is held stays where it is, or goes where it is told.
+    /// The object stays where it is, or goes where it is told.
     Carrying,
-    /// What is held sinks until it stands on something.
+    /// The object sinks until it stands on something.
     PuttingDown,
     /// The grasp is let go.
     Releasing,
@@ -145,7 +145,7 @@ pub enum Event {
     Missed,
     /// The force has grown to its full, and the hand can carry.
     Firm,
-    /// What was put down stands.
+    /// The object that was put down stands.
     Down,
 }
 
@@ -675,7 +675,7 @@ mod tests {
 
     #[test]
     fn a_lost_link_lets_go_and_then_is_a_fault() {
-        let ramps = ramps(4, 4);
+        let ramps = ramps(4, 4).with(Stages { closing: true, opening: false }, 0);
         for stopped in [false, true] {
             let mut supervisor = in_mode(Mode::Grasping, &ramps);
             for left in [0.75, 0.5, 0.25] {
@@ -695,6 +695,12 @@ mod tests {
         for (mode, next) in [
             (Mode::Disarmed, Mode::Disarmed),
             (Mode::Armed, Mode::Fault),
+            (Mode::Moving, Mode::Fault),
+            // Nothing is held yet: there is nothing to let go.
+            (Mode::Closing, Mode::Fault),
+            (Mode::Grasping, Mode::Releasing),
+            (Mode::Carrying, Mode::Releasing),
+            (Mode::PuttingDown, Mode::Releasing),
             (Mode::Releasing, Mode::Releasing),
             (Mode::Fault, Mode::Fault),
         ] {

@@ -496,7 +496,7 @@ struct Action<const J: usize> {
     not_finite: Option<Raised>,
     /// The laws' account; `None` without torque.
     account: Option<Account<f32>>,
-    /// What was noticed.
+    /// The notice.
     noticed: Option<Noticed>,
 }
 

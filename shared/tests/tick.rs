@@ -925,3 +925,40 @@ fn whatever_is_commanded_no_torque_jumps() {
     println!("ticks in each mode {ticks_in:?}");
     assert!(ticks_in[..8].iter().all(|&ticks| ticks > 1_000), "{ticks_in:?}");
 }
+
+/// The faults that the readings of a tick can bring, in every mode with torque: no torque from that tick on, and the hand can be
+/// cleared. In a mode without torque there is nothing to take away.
+#[test]
+fn every_fault_of_a_reading_takes_the_torque_away_in_every_mode() {
+    for mode in Mode::ALL.into_iter().filter(|mode| mode.is_powered()) {
+        let (params, counts) = (params_for(mode), counts_in(mode));
+        let changed = |by: i32| {
+            let mut changed = counts;
+            changed[4] += by;
+            changed
+        };
+        let failed = |fault| Input::failed(Raised::at(3, fault), None);
+        let angles_rad = *in_mode(&params, mode).angles_rad();
+        let (jump, nan) = (changed(30_000), [f32::NAN; 12]);
+        let late = Input::counts(&counts, None).with(Events::NONE.with(Event::Late, true));
+        for (input, ticks, fault) in [
+            (failed(Fault::SampleMissing), 1, Fault::SampleMissing),
+            (failed(Fault::CounterReset), 1, Fault::CounterReset),
+            (failed(Fault::OutputFailed), 1, Fault::OutputFailed),
+            (Input::counts(&jump, None), 1, Fault::CountJump),
+            (Input::ideal(&nan, &[0.0; 12], None), 1, Fault::NotFinite),
+            (Input::ideal(&[2.5; 12], &[0.0; 12], None), 1, Fault::BeyondRange),
+            (Input::ideal(&angles_rad, &[100.0; 12], None), 1, Fault::Overspeed),
+            (late, 10, Fault::TickLate),
+        ] {
+            let mut state = in_mode(&params, mode);
+            let mut output = tick(&params, &mut state, &input);
+            for _ in 1..ticks {
+                output = tick(&params, &mut state, &input);
+            }
+            let raised = output.record.fault.map(|raised| raised.fault);
+            assert_eq!((output.record.mode, raised), (Mode::Fault, Some(fault)), "{mode:?}");
+            assert_eq!((output.powered, output.torques_nm), (false, [0.0; 12]), "{mode:?}, {fault:?}");
+        }
+    }
+}

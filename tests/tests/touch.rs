@@ -10,7 +10,7 @@ use blindgrasp_tests::random::Draw;
 use nalgebra::Vector3;
 use std::f64::consts::PI;
 
-/// What became of a closing.
+/// The outcome of a closing.
 struct Touch {
     mass_kg: f64,
     /// The largest force of a fingertip before the grasp began, N.

@@ -71,7 +71,7 @@ keys! {
         /// The simulated world.
         #[serde(default)]
         pub plant: PlantSettings,
-        /// What the hand is told, step by step, once it is armed; without it, to grasp at time 0.
+        /// The commands to the hand, step by step, once it is armed; without them it grasps at time 0.
         #[serde(rename = "script", default, skip_serializing_if = "Vec::is_empty")]
         pub script: Vec<StepFile>,
     }
@@ -82,10 +82,10 @@ keys! {
     #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
     #[serde(deny_unknown_fields)]
     pub struct StepFile {
-        /// What the hand is told, in the words of `console`: `posture preshape`, `grasp`, `move z_mm=15 turn_z_deg=20`, `put-down`.
+        /// The command, in the words of `console`: `posture preshape`, `grasp`, `move z_mm=15 turn_z_deg=20`, `put-down`.
         #[serde(rename = "do")]
         pub order: String,
-        /// What the hand has to notice first, since the step before: `in-posture`, `holding`, `at-target`, `on-ground`, ...
+        /// The notice that has to come first, since the step before: `in-posture`, `holding`, `at-target`, `on-ground`, ...
         #[serde(default, skip_serializing_if = "Option::is_none")]
         pub when: Option<String>,
         /// Time that is to pass then, s.

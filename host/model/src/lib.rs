@@ -117,7 +117,7 @@ pub struct Scene {
     pub substeps: usize,
     /// Oddities that can be simulated, in words.
     pub warnings: Vec<String>,
-    /// What the hand is told, step by step.
+    /// The commands to the hand, step by step.
     pub script: Vec<Step>,
     /// The effective configuration.
     pub file: SceneFile,

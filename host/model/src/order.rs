@@ -1,4 +1,4 @@
-//! What a hand is told, and what it tells, in words: the same in the script of a scene and on the console.
+//! Commands and notices of a hand in words: the same in the script of a scene and on the console.
 
 use super::error::suggestion;
 use blindgrasp_shared::command::{Command, Grasp, Move};
@@ -83,7 +83,7 @@ pub fn usage(word: &Word) -> String {
 /// Reads a command in words; `None` if its first word is none of [`WORDS`].
 ///
 /// # Errors
-/// What is wrong with the values, and what they are to be.
+/// The error in the values, and what they are to be.
 pub fn command(line: &str, names: &Names<'_>) -> Option<Result<Command, String>> {
     let mut words = line.split_whitespace();
     let word = words.next()?;

@@ -17,7 +17,7 @@ pub struct Step {
     pub command: Command,
     /// The command in words.
     pub order: String,
-    /// What has to be noticed first, since the step before.
+    /// The notice that has to come first, since the step before.
     pub when: Option<Notice>,
     /// Time that is to pass then, s.
     pub after_s: f64,

@@ -1,4 +1,4 @@
-//! What is held, moved by keys: a step a key, along or about an axis of the base frame.
+//! Moving what is held by keys: a step a key, along or about an axis of the base frame.
 
 use blindgrasp_shared::command::Move;
 use blindgrasp_shared::hand::Turn;

@@ -67,7 +67,7 @@ pub struct Stepped {
     pub mode: Mode,
     /// The fault that the hand is in.
     pub fault: Option<Raised>,
-    /// What the tick noticed by itself.
+    /// The notice of the tick.
     pub noticed: Option<Noticed>,
     /// The reason for which its command was refused.
     pub refused: Option<Refusal>,

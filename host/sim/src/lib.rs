@@ -110,10 +110,10 @@ pub struct Simulation<C = Alone> {
     judge: Judge,
     /// Torques on their way to the motors; `None` until the hand is armed.
     delay: Option<Delay>,
-    /// What the hand is told, if the scene has a script.
+    /// The script, if the scene has one.
     script: Script,
     has_script: bool,
-    /// What it has noticed, and when, s.
+    /// Its notices, with their times, s.
     noticed: Vec<(f64, Noticed)>,
     /// The next tick.
     tick: u64,

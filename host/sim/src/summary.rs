@@ -40,7 +40,7 @@ pub struct Summary {
     pub lost_reason: Option<String>,
     /// The fault that the controller ended in, in words.
     pub fault: Option<String>,
-    /// What the hand noticed, in words, and when, s.
+    /// The hand's notices in words, with their times, s.
     #[serde(default)]
     pub noticed: Vec<(f64, String)>,
     /// The reason for which the scene's script was not done to the end.
@@ -122,7 +122,7 @@ pub struct Ending {
     pub is_put_down: bool,
     /// The fault that the controller ended in, in words.
     pub fault: Option<String>,
-    /// What the hand noticed, and when, s.
+    /// The hand's notices, with their times, s.
     pub noticed: Vec<(f64, Noticed)>,
     /// The reason for which its script was not done to the end.
     pub shortfall: Option<String>,

@@ -80,7 +80,7 @@ impl SampledLoop {
     /// The loop of a scene about its grasp, with gains of the laws so many times as firm.
     ///
     /// # Errors
-    /// Why there is none.
+    /// The reason for which there is none.
     pub fn of_scene(scene: &Scene, firmness: f64) -> Result<Self, TuneError> {
         Ok(Self {
             situations: Situation::of_scene(scene, firmness)?,
@@ -93,7 +93,7 @@ impl SampledLoop {
     /// The loop of a hand about its nominal grasp, a tick late, as its firmware is, with gains of the laws so many times as firm.
     ///
     /// # Errors
-    /// Why there is none.
+    /// The reason for which there is none.
     pub fn nominal(
         hand: &HandModel,
         file: &HandFile,

@@ -33,7 +33,7 @@ const SENDING: Duration = Duration::from_secs(1);
 const EVERY_TICK: u16 = 1;
 /// Time for which something to be noticed is waited for, if nothing else is said, s: as in the script of a scene.
 const PATIENCE_S: f32 = 10.0;
-/// What can be typed besides the commands of the hand, and its meanings.
+/// The words that can be typed besides the commands of the hand, with their meanings.
 const WORDS: [(&str, &str, &str); 12] = [
     ("help", "", "show this"),
     ("status", "", "mode, fault, what is held, counts, torques, what limits, and what went over the line"),
@@ -208,7 +208,7 @@ enum Status {
     Next,
 }
 
-/// What a line waits for.
+/// The thing that a line waits for.
 struct Awaited {
     notice: Notice,
     time_s: f32,
@@ -226,9 +226,9 @@ struct Console {
     hand: Option<HandModel>,
     /// The names of its postures.
     postures: Vec<String>,
-    /// What the hand has noticed since its last command.
+    /// The notices of the hand since its last command.
     noticed: Vec<Notice>,
-    /// What is waited for before the next line.
+    /// The thing that is waited for before the next line.
     awaited: Option<Awaited>,
     /// Of a hand that is known, with the signs and zeros in force.
     encoders: Vec<Encoder>,

@@ -25,10 +25,11 @@ use std::path::{Path, PathBuf};
 const BENCH_SCENE: &str = "cube";
 /// The firmware's measurements: key, and what it is.
 #[cfg(unix)]
-const FIGURES: [(&str, &str); 6] = [
+const FIGURES: [(&str, &str); 7] = [
     ("law_gravity_off", "grasp law without gravity compensation"),
     ("law_gravity_on", "grasp law with gravity compensation"),
     ("tick", "whole tick"),
+    ("tick_move", "the same, with a `move` taken"),
     ("encode_full", "encoding of its record in full"),
     ("encode_input", "digest and encoding of its input record"),
     ("save", "saving its state, one tick in a thousand"),

@@ -1,4 +1,4 @@
-//! What is held: where it is, as the fingertips tell, and where it is to be.
+//! The object that is held: where it is, as the fingertips tell, and where it is to be.
 //!
 //! - **Fast**: the [virtual frame](crate::control::frame) of the fingertips' centres follows the target.
 //! - **Slow**: fingertips roll, so that the object turns by more than the frame of centres. Points fixed in the fingertips where they

@@ -87,7 +87,7 @@ pub(crate) struct Cycle<const J: usize, const F: usize> {
     pub(crate) begun: Mode,
     /// The posture that is to be moved to, and the time for the way, ms, until that has begun.
     pub(crate) asked: Option<(Option<u8>, u16)>,
-    /// What closed the fingertips fades while the grasp's force grows.
+    /// `true` while the closing forces fade and the grasp's grow.
     pub(crate) fades: bool,
     /// Fingertips go outwards again.
     pub(crate) retreats: bool,
@@ -96,7 +96,7 @@ pub(crate) struct Cycle<const J: usize, const F: usize> {
     pub(crate) moving: Moving<J>,
     pub(crate) closing: Closing<F>,
     pub(crate) carry: Carry<F>,
-    /// What the laws see of it; made anew in each tick.
+    /// The frame and its target as the laws see them; made anew in each tick.
     pub(crate) held: Held<f32, F>,
 }
 

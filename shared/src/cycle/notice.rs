@@ -1,4 +1,4 @@
-//! What the tick notices by itself, and tells.
+//! Notices: events that the tick finds by itself, and tells.
 
 use core::fmt;
 use serde::{Deserialize, Serialize};

@@ -16,10 +16,10 @@ use nalgebra::{Complex, ComplexField, DMatrix, Schur};
 use serde::Serialize;
 use std::f64::consts::TAU;
 
-/// What comes or goes at less than this rate is neutral, 1/s: the whole hand, of whose place the law knows nothing, and fingertips that
+/// Motions that come or go at less than this rate are neutral, 1/s: the whole hand, of whose place the law knows nothing, and fingertips that
 /// only their torsional viscosity holds.
 const NEUTRAL_HZ: f64 = 0.3;
-/// What falls below this share within a tick is no motion that anybody sees.
+/// Motions that fall below this share within a tick are none that anybody sees.
 const VANISHING: f64 = 0.2;
 
 /// The sampled loop of a hand.

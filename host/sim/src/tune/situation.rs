@@ -48,7 +48,7 @@ impl Situation {
     /// come to rest, and the hand before it touches. Fingertips roll. The gains of the laws are so many times as firm as the scene says.
     ///
     /// # Errors
-    /// Why there is none.
+    /// The reason for which there is none.
     pub fn of_scene(scene: &Scene, firmness: f64) -> Result<Vec<Self>, TuneError> {
         let mut model = model(scene);
         model.joint_limits = false;
@@ -81,7 +81,7 @@ impl Situation {
     /// firm as its file says.
     ///
     /// # Errors
-    /// Why there is none.
+    /// The reason for which there is none.
     pub fn nominal(
         hand: &HandModel,
         file: &HandFile,

@@ -145,7 +145,7 @@ impl Report {
         text
     }
 
-    /// What to put into the hand's file.
+    /// The keys for the hand's file.
     fn write_keys(&self, text: &mut String, tuned: &Tuned) {
         let is_less = tuned.margins.delay_margin_ticks.is_none_or(|ticks| ticks < self.wanted_ticks);
         if is_less {
