@@ -32,8 +32,7 @@ fn watch(scene: &Scene, mut see: impl FnMut(f64, &Simulation<Alone>)) -> blindgr
         let t_s = step.t_s;
         see(t_s, &simulation);
     }
-    let summary = simulation.summary();
-    summary
+    simulation.summary()
 }
 
 const LIFTED: [(&str, Option<&str>, f64); 2] =
