@@ -135,7 +135,7 @@ pub(super) fn of_hand(hand: &str, joint_names: &[String]) -> (String, Vec<u8>) {
     tick_fields.push(typed("joints", JOINTS, Type::Message, full("Joints")));
     let joints = joint_fields(joint_names).into_iter().zip(1..);
     let joints = joints.map(|(name, number)| typed(&name, number, Type::Message, full("Joint")));
-    let modes = Mode::ALL.iter().map(|mode| (mode.words().to_uppercase(), *mode as u64));
+    let modes = Mode::ALL.iter().map(|mode| (upper_case(&format!("{mode:?}")), *mode as u64));
     let faults =
         Fault::ALL.iter().map(|fault| (upper_case(&format!("{fault:?}")), u64::from(fault.number())));
     let tick = Message {

@@ -193,6 +193,12 @@ fn every_field_whose_bytes_end_or_are_none_is_damage() {
 
 /// A message as in a `.proto` file.
 fn source(message: &DescriptorProto, lines: &mut Vec<String>) {
+    let values = message.enum_type.iter().flat_map(|kind| &kind.value).map(|value| value.name());
+    for name in message.field.iter().map(|field| field.name()).chain(values).chain([message.name()]) {
+        // Readers refuse a schema in which one name is none.
+        let of_a_name = |c: char| c.is_ascii_alphanumeric() || c == '_';
+        assert!(name.chars().all(of_a_name) && !name.starts_with(|c: char| c.is_ascii_digit()), "{name:?}");
+    }
     lines.push(format!("message {}", message.name()));
     for field in &message.field {
         let label = match (field.label(), field.proto3_optional()) {
@@ -375,7 +381,8 @@ fn the_schema_of_a_hand_has_its_joints_and_every_signal() {
     for (name, number) in ["thumb_base", "joint_1", "thumb_base_2"].iter().zip(1..) {
         expect(&format!("Message .blindgrasp.my_hand.Tick.Joint {name} = {number}"));
     }
-    let modes = Mode::ALL.map(|mode| format!(" {} = {}", mode.words().to_uppercase(), mode as u8));
+    let modes =
+        Mode::ALL.map(|mode| format!(" {} = {}", mode.words().to_uppercase().replace(' ', "_"), mode as u8));
     expect(&format!("enum Mode{}", modes.concat()));
     let faults: String = Fault::ALL.iter().map(|fault| format!(" {fault:?} = {}", fault.number())).collect();
     let told = lines.next().unwrap();
