@@ -12,7 +12,7 @@ use crate::link::MOST_SENT;
 use crate::model::{FINGERS, JOINTS, params};
 use crate::semihosting::File;
 use blindgrasp_shared::command::{Command, Grasp, Move};
-use blindgrasp_shared::control::{Held, Latch, LawsConfig, Stance};
+use blindgrasp_shared::control::{Account, Held, Latch, LawsConfig, Stance};
 use blindgrasp_shared::device::Inputs;
 use blindgrasp_shared::fault::Raised;
 use blindgrasp_shared::hand::Posture;
@@ -78,6 +78,7 @@ struct Figures {
     law_gravity_on: u32,
     tick: u32,
     tick_move: u32,
+    tick_grasp: u32,
     encode_full: u32,
     encode_input: u32,
     save: u32,
@@ -133,7 +134,12 @@ pub fn run(timer: &mut SYST, control: &mut Control) -> Result<(), &'static str> 
     figures.law_gravity_on = law(&counter, &params, &without)?;
     without.hold.gravity_m_s2 = None;
     figures.law_gravity_off = law(&counter, &params, &without)?;
-    whole_tick(&counter, &params, control, &mut figures)?;
+    let mut alone = Grasp::CONFIGURED;
+    alone.gains.frame = [Some(0.0); 2];
+    let mut of_law_alone = Figures::default();
+    whole_tick(&counter, &params, control, alone, &mut of_law_alone)?;
+    figures.tick_grasp = of_law_alone.tick;
+    whole_tick(&counter, &params, control, Grasp::CONFIGURED, &mut figures)?;
     print(&figures)
 }
 
@@ -154,6 +160,7 @@ fn law(
     for tick in 0..TICKS {
         joints.tick = tick;
         let angles_rad = joints.angles_rad();
+        let (mut torques_nm, mut account) = ([0.0; JOINTS], Account::none());
         most = most.max(counter.instructions(|| {
             hand.forward_kinematics(black_box(&angles_rad), &mut posture);
             let stance = Stance {
@@ -163,7 +170,8 @@ fn law(
                 speeds_rad_s: black_box(&speeds_rad_s),
                 held: &held,
             };
-            black_box(laws.torques(&stance, Some(&laws.grip(&latch))));
+            laws.add_torques(&stance, Some(&laws.grip(&latch)), &mut torques_nm, &mut account);
+            black_box((&torques_nm, &account));
         }));
     }
     Ok(most)
@@ -177,27 +185,30 @@ const WAY: Move = Move {
     time_ms: 60_000,
 };
 
-/// The whole tick with its request, while what is grasped is moved, and the encoding of its record.
+/// The whole tick with its request, in a grasp, and the encoding of its record. With a virtual frame, what is grasped is moved.
 fn whole_tick(
     counter: &Counter,
     params: &HandParams,
     control: &mut Control,
+    grasp: Grasp,
     figures: &mut Figures,
 ) -> Result<(), &'static str> {
     // From hello to full force: the soft start takes as long as it takes.
     let settle = 20 + params.config().supervisor.soft_start_ms as usize;
+    let carries = grasp == Grasp::CONFIGURED;
     let mut joints = Swinging { params, tick: 0 };
     let mut session = 0;
     for tick in 0..settle + 1 + TICKS {
         let request = match tick {
             0 => Request::Hello { interface_version: INTERFACE_VERSION },
             1 => Request::Telemetry { decimation: 1, signals: Signals::FULL },
+            2 => Request::Command(Command::Stop),
             // Nothing is between fingertips that only swing: the grasp begins at once.
             3 => Request::SetParameter { parameter: Parameter::CLOSING_SPEED, index: 0, value: 0.0 },
             5 => Request::Command(Command::Arm),
-            10 => Request::Command(Command::Grasp(Grasp::CONFIGURED)),
+            10 => Request::Command(Command::Grasp(grasp)),
             // On its way a target costs the most.
-            _ if tick == settle => Request::Command(Command::Move(WAY)),
+            _ if tick == settle && carries => Request::Command(Command::Move(WAY)),
             _ => Request::Heartbeat,
         };
         let packet = Packet { session, sequence: tick as u16, request };
@@ -220,7 +231,7 @@ fn whole_tick(
         if tick < settle {
             continue;
         }
-        if outputs.record.mode != Mode::Carrying {
+        if outputs.record.mode != if carries { Mode::Carrying } else { Mode::Grasping } {
             return Err("the hand does not grasp");
         }
         let instructions = instructions.saturating_sub(idle);
@@ -256,12 +267,12 @@ fn whole_tick(
 }
 
 fn print(figures: &Figures) -> Result<(), &'static str> {
-    let &Figures { law_gravity_off, law_gravity_on, tick, tick_move, encode_full, .. } = figures;
+    let &Figures { law_gravity_off, law_gravity_on, tick, tick_move, tick_grasp, encode_full, .. } = figures;
     let &Figures { encode_input, save, full_bytes, input_bytes, snapshot_bytes, .. } = figures;
     let mut json = String::<448>::new();
     writeln!(
         json,
-        "{{\"law_gravity_off\": {law_gravity_off}, \"law_gravity_on\": {law_gravity_on}, \"tick\": {tick}, \"tick_move\": {tick_move}, \
+        "{{\"law_gravity_off\": {law_gravity_off}, \"law_gravity_on\": {law_gravity_on}, \"tick\": {tick}, \"tick_move\": {tick_move}, \"tick_grasp\": {tick_grasp}, \
          \"encode_full\": {encode_full}, \"encode_input\": {encode_input}, \"save\": {save}, \
          \"full_bytes\": {full_bytes}, \"input_bytes\": {input_bytes}, \"snapshot_bytes\": {snapshot_bytes}}}"
     )

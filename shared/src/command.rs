@@ -8,7 +8,9 @@ use core::fmt;
 use serde::{Deserialize, Serialize};
 
 /// A command.
+// Its tag is a word, so that it is moved by words and not by bytes.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[repr(u32)]
 pub enum Command {
     /// Let the joints have torque: hold their weight and damp them.
     Arm,

@@ -90,7 +90,7 @@ pub struct Device<const J: usize, const F: usize> {
     faster_bauds: &'static [u32],
     saving: Option<Save>,
     /// The answer to a save that is over, until a tick has no other.
-    saved: Option<Reply<'static, J>>,
+    saved: Option<(u16, Option<Refusal>)>,
     /// `true` if what is read with the signs and zeros that were set is known to be right.
     is_confirmed: bool,
     /// The failure of the joints when they were last written.
@@ -142,8 +142,8 @@ impl<const J: usize, const F: usize> Device<J, F> {
         outputs: &mut Outputs<J>,
     ) {
         let read = joints.collect();
-        let reading = self.failed.take().map_or(read, Reading::Failed);
-        self.tick_into(&reading, inputs, burst, outputs);
+        let failed = self.failed.take().map(Reading::Failed);
+        self.tick_into(failed.as_ref().unwrap_or(&read), inputs, burst, outputs);
         if outputs.record.answer == Some(CLEARED) {
             joints.recover();
         }
@@ -166,9 +166,10 @@ impl<const J: usize, const F: usize> Device<J, F> {
         outputs: &mut Outputs<J>,
     ) {
         self.session.quiet_ticks = self.session.quiet_ticks.saturating_add(1);
+        outputs.reply = None;
         let asked = match &inputs.packet {
-            Some(packet) => self.ask(packet, reading, burst),
-            None => Asked::Nothing,
+            Some(packet) => self.ask(packet, reading, burst, &mut outputs.reply),
+            None => Asked::Done,
         };
         outputs.order = self.save(inputs.stored);
         let heartbeat = matches!(asked, Asked::Heartbeat { .. });
@@ -214,16 +215,16 @@ impl<const J: usize, const F: usize> Device<J, F> {
             Asked::Rate { baud, .. } => Some(baud),
             _ => None,
         };
-        match asked {
-            Asked::Nothing => outputs.reply = if inputs.no_room { None } else { self.saved.take() },
-            Asked::Answered(reply) => outputs.reply = Some(reply),
-            Asked::Heartbeat { sequence } | Asked::Rate { sequence, .. } => {
-                outputs.reply = Some(Reply::Answer { sequence, refused: None });
-            }
+        let answer = match asked {
+            Asked::Done if inputs.no_room || outputs.reply.is_some() => None,
+            Asked::Done => self.saved.take(),
+            Asked::Heartbeat { sequence } | Asked::Rate { sequence, .. } => Some((sequence, None)),
             Asked::Command { sequence, .. } => {
-                let refused = record.answer.and_then(|answer| answer.refused);
-                outputs.reply = Some(Reply::Answer { sequence, refused });
+                Some((sequence, record.answer.and_then(|answer| answer.refused)))
             }
+        };
+        if let Some((sequence, refused)) = answer {
+            outputs.reply = Some(Reply::Answer { sequence, refused });
         }
     }
 
@@ -262,7 +263,7 @@ impl<const J: usize, const F: usize> Device<J, F> {
         }
         // Who asked may be gone.
         if session == self.session.number {
-            self.saved = Some(Reply::Answer { sequence, refused });
+            self.saved = Some((sequence, refused));
         }
     }
 
@@ -310,96 +311,119 @@ impl<const J: usize, const F: usize> Device<J, F> {
         if self.telemetry.part_is_due(waiting) { self.snapshot.next() } else { None }
     }
 
-    /// Takes a request before the tick.
+    /// Takes a request before the tick. Its reply, if there is one yet, is written where it stays.
     #[inline(never)]
-    fn ask(&mut self, packet: &Packet<J>, reading: &Reading<J>, burst: &Burst<J>) -> Asked<J> {
+    fn ask(
+        &mut self,
+        packet: &Packet<J>,
+        reading: &Reading<J>,
+        burst: &Burst<J>,
+        reply: &mut Option<Reply<'static, J>>,
+    ) -> Asked {
         let sequence = packet.sequence;
-        let answer = |refused| Asked::Answered(Reply::Answer { sequence, refused });
         match packet.request {
             Request::Hello { interface_version } => {
                 let ends_another = self.session.is_in_use();
                 self.session.begin(packet.session, sequence, interface_version == INTERFACE_VERSION);
                 let identity = Identity { changed: self.params.changed(), ..self.identity };
                 let session = self.session.number;
-                return Asked::Answered(Reply::Identity { sequence, session, identity, ends_another });
+                *reply = Some(Reply::Identity { sequence, session, identity, ends_another });
+                return Asked::Done;
             }
             Request::Command(Command::Stop) => {
                 return Asked::Command { sequence, command: Command::Stop };
             }
             _ => {}
         }
-        if let Some(refusal) = self.session.refuse(packet.session, sequence) {
-            return answer(Some(refusal));
+        let mut refused = self.session.refuse(packet.session, sequence);
+        if refused.is_none() && self.saving.is_some() && packet.request.is_to_wait_for_a_save() {
+            refused = Some(Refusal::Saving);
         }
-        if self.saving.is_some() && packet.request.is_to_wait_for_a_save() {
-            return answer(Some(Refusal::Saving));
+        if refused.is_some() {
+            *reply = Some(Reply::Answer { sequence, refused });
+            return Asked::Done;
         }
-        match packet.request {
-            Request::Command(command) => Asked::Command { sequence, command },
-            Request::Heartbeat => Asked::Heartbeat { sequence },
+        let refused = match packet.request {
+            Request::Command(command) => return Asked::Command { sequence, command },
+            Request::Heartbeat => return Asked::Heartbeat { sequence },
             Request::SetParameter { parameter, index, value } => {
                 let set = |params: &mut Params<J, F>| params.set(parameter, index, value);
-                answer(self.configure(parameter.is_reading(), set))
+                self.configure(parameter.is_reading(), set)
             }
             Request::Zero { joint } => match self.params.config().estimator.counts(reading) {
-                Some(counts) => answer(self.configure(true, |params| params.set_zero(joint, &counts))),
-                None => answer(Some(Refusal::NotRead)),
+                Some(counts) => self.configure(true, |params| params.set_zero(joint, &counts)),
+                None => Some(Refusal::NotRead),
             },
             Request::Confirm => {
                 self.is_confirmed = true;
-                answer(None)
+                None
             }
             Request::Save | Request::Defaults => {
                 match self.begin_save(sequence, packet.request == Request::Defaults) {
-                    Some(refusal) => answer(Some(refusal)),
-                    None => Asked::Nothing,
+                    // It is answered when it is over.
+                    None => return Asked::Done,
+                    refused => refused,
                 }
             }
             Request::GetParameter { parameter, index } => match self.params.get(parameter, index) {
-                Ok(setting) => Asked::Answered(Reply::Value { sequence, parameter, index, setting }),
-                Err(refusal) => answer(Some(refusal)),
+                Ok(setting) => {
+                    *reply = Some(Reply::Value { sequence, parameter, index, setting });
+                    return Asked::Done;
+                }
+                Err(refusal) => Some(refusal),
             },
             Request::Telemetry { decimation, signals } => {
-                if !signals.are_known() {
-                    return answer(Some(Refusal::OutOfRange));
+                let is_known = signals.are_known();
+                if is_known {
+                    self.telemetry.begin(decimation, signals);
+                    self.snapshot.stop();
                 }
-                self.telemetry.begin(decimation, signals);
-                self.snapshot.stop();
-                answer(None)
+                (!is_known).then_some(Refusal::OutOfRange)
             }
             Request::Burst { index } => match burst.get(index) {
-                Caught::Nothing => answer(Some(Refusal::NoBurst)),
-                Caught::NotOver => answer(Some(Refusal::BurstNotOver)),
-                Caught::NoSuchRecord => answer(Some(Refusal::OutOfRange)),
+                Caught::Nothing => Some(Refusal::NoBurst),
+                Caught::NotOver => Some(Refusal::BurstNotOver),
+                Caught::NoSuchRecord => Some(Refusal::OutOfRange),
                 Caught::Record { count, record } => {
-                    Asked::Answered(Reply::Burst { sequence, index, count, record })
+                    *reply = Some(Reply::Burst { sequence, index, count, record });
+                    return Asked::Done;
                 }
             },
-            Request::Joints(_) => answer(Some(Refusal::JointsAreReal)),
+            Request::Joints(_) => Some(Refusal::JointsAreReal),
             Request::Goodbye => {
                 self.session.is_open = false;
                 self.telemetry.begin(0, Signals::NONE);
                 self.snapshot.stop();
-                Asked::Rate { sequence, baud: FIRST_BAUD }
+                return Asked::Rate { sequence, baud: FIRST_BAUD };
             }
-            Request::Rate { .. } if self.state.mode() != Mode::Disarmed => answer(Some(Refusal::NotDisarmed)),
+            Request::Rate { .. } if self.state.mode() != Mode::Disarmed => Some(Refusal::NotDisarmed),
             Request::Rate { baud } if baud == FIRST_BAUD || self.faster_bauds.contains(&baud) => {
-                Asked::Rate { sequence, baud }
+                return Asked::Rate { sequence, baud };
             }
-            Request::Rate { .. } => answer(Some(Refusal::NoSuchRate)),
+            Request::Rate { .. } => Some(Refusal::NoSuchRate),
             // Taken above.
-            Request::Hello { .. } => answer(None),
-        }
+            Request::Hello { .. } => None,
+        };
+        *reply = Some(Reply::Answer { sequence, refused });
+        Asked::Done
     }
 }
 
 /// The result of a request before the tick.
-enum Asked<const J: usize> {
-    Nothing,
-    Answered(Reply<'static, J>),
-    Heartbeat { sequence: u16 },
-    Rate { sequence: u16, baud: u32 },
-    Command { sequence: u16, command: Command },
+enum Asked {
+    /// Nothing is left to be done; the reply is there, or comes later.
+    Done,
+    Heartbeat {
+        sequence: u16,
+    },
+    Rate {
+        sequence: u16,
+        baud: u32,
+    },
+    Command {
+        sequence: u16,
+        command: Command,
+    },
 }
 
 /// A save under way.

@@ -160,7 +160,7 @@ trait Field: Sized {
     const KEPT: Self::Kept;
 
     /// Keeps it.
-    fn keep(&self) -> Self::Kept;
+    fn keep(&self, to: &mut Self::Kept);
     /// Gives back what was kept.
     fn kept(kept: &Self::Kept) -> Self;
     /// Tells each signal of it; `named` is the signal of a number.
@@ -184,8 +184,8 @@ macro_rules! plain {
             type Kept = Self;
             const KEPT: Self = $blank;
 
-            fn keep(&self) -> Self {
-                *self
+            fn keep(&self, to: &mut Self::Kept) {
+                *to = *self;
             }
 
             fn kept(kept: &Self) -> Self {
@@ -216,8 +216,8 @@ macro_rules! lists {
             type Kept = Self;
             const KEPT: Self = List::empty($blank);
 
-            fn keep(&self) -> Self {
-                *self
+            fn keep(&self, to: &mut Self::Kept) {
+                *to = *self;
             }
 
             fn kept(kept: &Self) -> Self {
@@ -247,8 +247,8 @@ macro_rules! reals {
             type Kept = Self;
             const KEPT: Self = $type::all(0.0);
 
-            fn keep(&self) -> Self {
-                *self
+            fn keep(&self, to: &mut Self::Kept) {
+                *to = *self;
             }
 
             fn kept(kept: &Self) -> Self {
@@ -276,8 +276,8 @@ impl Field for Events {
     type Kept = Self;
     const KEPT: Self = Events::NONE;
 
-    fn keep(&self) -> Self {
-        *self
+    fn keep(&self, to: &mut Self::Kept) {
+        *to = *self;
     }
 
     fn kept(kept: &Self) -> Self {
@@ -300,10 +300,10 @@ impl Field for Option<Raised> {
     type Kept = (u8, bool, u8);
     const KEPT: (u8, bool, u8) = (0, false, 0);
 
-    fn keep(&self) -> Self::Kept {
-        self.map_or(Self::KEPT, |Raised { fault, joint }| {
+    fn keep(&self, to: &mut Self::Kept) {
+        *to = self.map_or(Self::KEPT, |Raised { fault, joint }| {
             (fault.number(), joint.is_some(), joint.unwrap_or(0))
-        })
+        });
     }
 
     fn kept(&(number, has_joint, joint): &Self::Kept) -> Self {
@@ -328,10 +328,10 @@ impl Field for Option<Noticed> {
     type Kept = (u8, bool, u8);
     const KEPT: (u8, bool, u8) = (0, false, 0);
 
-    fn keep(&self) -> Self::Kept {
-        self.map_or(Self::KEPT, |Noticed { notice, fingertip }| {
+    fn keep(&self, to: &mut Self::Kept) {
+        *to = self.map_or(Self::KEPT, |Noticed { notice, fingertip }| {
             (notice as u8 + 1, fingertip.is_some(), fingertip.unwrap_or(0))
-        })
+        });
     }
 
     fn kept(&(number, has_fingertip, fingertip): &Self::Kept) -> Self {
@@ -352,10 +352,14 @@ impl Field for Option<Answer> {
     type Kept = (Command, u8);
     const KEPT: (Command, u8) = (Command::Arm, 0);
 
-    fn keep(&self) -> Self::Kept {
-        self.map_or(Self::KEPT, |Answer { command, refused }| {
-            (command, refused.map_or(1, |refusal| 2 + refusal as u8))
-        })
+    // Without an answer the command stays as it is: it takes long to move.
+    fn keep(&self, to: &mut Self::Kept) {
+        match self {
+            None => to.1 = 0,
+            Some(Answer { command, refused }) => {
+                *to = (*command, refused.map_or(1, |refusal| 2 + refusal as u8));
+            }
+        }
     }
 
     fn kept(&(command, number): &Self::Kept) -> Self {
@@ -406,7 +410,7 @@ macro_rules! signals {
             pub(crate) const BLANK: Self = Self { $($field: <$type as Field>::KEPT,)* };
 
             pub(crate) fn keep(&mut self, record: &Record<J>) {
-                $(self.$field = record.$field.keep();)*
+                $(record.$field.keep(&mut self.$field);)*
             }
 
             pub(crate) fn record(&self) -> Record<J> {

@@ -329,7 +329,8 @@ pub(crate) fn tick_into<const J: usize, const F: usize>(
         stages::obey(params, state, before, command);
     }
     let grasped = state.latch.is_some();
-    let mut action = act(params, state);
+    let mut action = Action::none();
+    act(params, state, &mut action);
     state.ledger.enter(&Entry {
         motion: &state.motion,
         last_nm: &state.torques_nm,
@@ -508,15 +509,19 @@ impl<const J: usize> Action<J> {
     }
 }
 
-/// The law and the limits, as the mode wants them.
-fn act<const J: usize, const F: usize>(params: &Params<J, F>, state: &mut State<J, F>) -> Action<J> {
+/// The law and the limits, as the mode wants them; written where it stays.
+fn act<const J: usize, const F: usize>(
+    params: &Params<J, F>,
+    state: &mut State<J, F>,
+    action: &mut Action<J>,
+) {
     let ramps = &params.prepared.ramps;
     if state.supervisor.drive(ramps) == Drive::Off {
         state.latch = None;
-        return Action::none();
+        return;
     }
     params.hand.forward_kinematics(&state.motion.angles_rad, &mut state.posture);
-    let noticed = stages::notice(params, state);
+    action.noticed = stages::notice(params, state);
     let drive = state.supervisor.drive(ramps);
     let State { motion, posture, latch, cycle, grasp, .. } = state;
     let Motion { angles_rad, speeds_rad_s, .. } = &*motion;
@@ -535,11 +540,12 @@ fn act<const J: usize, const F: usize>(params: &Params<J, F>, state: &mut State<
     };
     let Prepared { laws, limits, watch, .. } = &params.prepared;
     let stance = Stance { hand: &params.hand, posture, angles_rad, speeds_rad_s, held: &cycle.held };
-    let (mut torques_nm, mut account) = laws.torques(&stance, grip.as_ref());
-    stages::torques(params, drive, motion, posture, cycle, &mut account, &mut torques_nm);
+    let account = action.account.insert(Account::none());
+    let torques_nm = &mut action.torques_nm;
+    laws.add_torques(&stance, grip.as_ref(), torques_nm, account);
+    stages::torques(params, drive, motion, posture, cycle, account, torques_nm);
     // A limit makes an infinite torque finite: both sides of it are looked at.
-    let wanted = watch.torques(&torques_nm);
-    let limiting = limits.apply(angles_rad, speeds_rad_s, &state.torques_nm, &mut torques_nm);
-    let not_finite = wanted.or(watch.torques(&torques_nm));
-    Action { torques_nm, limiting, not_finite, account: Some(account), noticed }
+    let wanted = watch.torques(torques_nm);
+    action.limiting = limits.apply(angles_rad, speeds_rad_s, &state.torques_nm, torques_nm);
+    action.not_finite = wanted.or(watch.torques(torques_nm));
 }

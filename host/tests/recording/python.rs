@@ -59,7 +59,7 @@ fn same_value(message: &Value, key: &str, ours: Told<'_>, joint_names: &[String]
         Told::Whole(value) => theirs.as_u64() == Some(value.into()),
         Told::Real(value) => same(theirs, value),
         Told::Truth(value) => theirs == value,
-        Told::Mode(mode) => *theirs == mode.words().to_uppercase(),
+        Told::Mode(mode) => *theirs == mode.words().to_uppercase().replace(' ', "_"),
         Told::Fault(fault) => {
             let plain = |name: &str| name.replace('_', "").to_uppercase();
             theirs.as_str().is_some_and(|theirs| plain(theirs) == plain(&format!("{fault:?}")))

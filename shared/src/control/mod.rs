@@ -433,13 +433,24 @@ impl<T: Real, const J: usize> Laws<T, J> {
         stance: &Stance<'_, T, J, F>,
         grip: Option<&Grip<'_, T, J, F>>,
     ) -> ([T; J], Account<T>) {
+        let (mut torques_nm, mut account) = ([T::zero(); J], Account::none());
+        self.add_torques(stance, grip, &mut torques_nm, &mut account);
+        (torques_nm, account)
+    }
+
+    /// Adds these torques, N m, and writes their account where it stays, since it takes long to move.
+    pub fn add_torques<const F: usize>(
+        &self,
+        stance: &Stance<'_, T, J, F>,
+        grip: Option<&Grip<'_, T, J, F>>,
+        torques_nm: &mut [T; J],
+        account: &mut Account<T>,
+    ) {
         let hold = &self.config.hold;
-        let (mut torques, mut account) = ([T::zero(); J], Account::none());
-        account.damping_w = hold.damp(stance.speeds_rad_s, &mut torques);
+        account.damping_w = hold.damp(stance.speeds_rad_s, torques_nm);
         if let Some(grip) = grip {
-            self.grasp_torques(stance, grip, &mut torques, &mut account);
+            self.grasp_torques(stance, grip, torques_nm, account);
         }
-        account.weight_potential_j = hold.hold_weight(stance.hand, stance.posture, &mut torques);
-        (torques, account)
+        account.weight_potential_j = hold.hold_weight(stance.hand, stance.posture, torques_nm);
     }
 }
