@@ -4,6 +4,7 @@ use blindgrasp::model::Scene;
 use blindgrasp::sim::Simulation;
 use blindgrasp::sim::controller::Alone;
 use blindgrasp_shared::cycle::Notice;
+use blindgrasp_shared::hand::Turn;
 use blindgrasp_shared::supervisor::Mode;
 use nalgebra::{UnitQuaternion, Vector3};
 
@@ -40,7 +41,8 @@ const LIFTED: [(&str, Option<&str>, f64); 2] =
 
 /// The arm's joints take part, by 0.2 m and 30 degrees: at rest the frame of the fingertips' centres is there. (Advantage 6 of the paper.)
 /// With joints in the fingers alone it is not, uncorrected, by a millimetre and some degrees: they can't keep all fingertips' attitudes to
-/// each other, which `u_st` holds, while they turn the object. There the slow correction makes the *object's* turn right.
+/// each other, which `u_st` holds, while they turn the object. There the slow correction makes the *object's* turn right: as the rolling
+/// fingertips tell it to 0.01 degrees, and in truth to 1.5.
 #[test]
 fn what_is_held_goes_where_it_is_asked_to() {
     let way = Vector3::new(-0.1, 0.1, 0.14);
@@ -55,35 +57,47 @@ fn what_is_held_goes_where_it_is_asked_to() {
         "control.carrying_integral_n=0",
         "duration_s=20",
     ];
-    let (off_m, frame_deg, _) =
-        moved("hand-arm-firm", &arm, "move x_mm=-100 y_mm=100 z_mm=140 turn_z_deg=30 time_s=6", way);
-    println!("hand-arm-firm: frame off by {:.4} mm, {:.4} deg", off_m * 1e3, frame_deg - 30.0);
-    assert!(off_m < 1e-4 && (frame_deg - 30.0).abs() < 0.2);
+    let arm = moved("hand-arm-firm", &arm, "move x_mm=-100 y_mm=100 z_mm=140 turn_z_deg=30 time_s=6", way);
+    println!("hand-arm-firm: frame off by {:.4} mm, {:.4} deg", arm.off_m * 1e3, arm.frame_deg - 30.0);
+    assert!(arm.off_m < 1e-4 && (arm.frame_deg - 30.0).abs() < 0.2);
     for name in ["cube-ideal", "prism-ideal"] {
-        let told = |correction: &str| {
+        let with = |correction: &str| {
+            // Touched first, then pressed: so the hand knows by how much its fingertips are pressed in.
             let settings = [
+                "start.indentation_m=1e-4",
+                "control.soft_start_s=0.2",
                 "control.frame_stiffness_n_m=300",
                 "control.frame_turn_stiffness_nm=0.3",
                 correction,
-                "duration_s=20",
+                "duration_s=30",
             ];
-            moved(name, &settings, "move x_mm=10 turn_z_deg=20 time_s=2", Vector3::new(0.01, 0.0, 0.0))
+            moved(name, &settings, "move x_mm=20 turn_z_deg=20 time_s=2", Vector3::new(0.02, 0.0, 0.0))
         };
-        let (off_m, frame_deg, object_deg) = told("control.carrying_correction_hz=0");
+        let Moved { off_m, frame_deg, told_deg, object_deg } = with("control.carrying_correction_hz=0");
         println!(
-            "{name}: frame off by {:.3} mm, {:.2} deg; the object turns by {object_deg:.2}",
+            "{name}: frame off by {:.3} mm, {:.2} deg; the object turns by {object_deg:.2}, told as {told_deg:.2}",
             off_m * 1e3,
             frame_deg - 20.0
         );
-        let (_, _, corrected_deg) = told("control.carrying_correction_hz=1");
-        println!("{name}: corrected, the object turns by {corrected_deg:.2} deg");
-        assert!((corrected_deg - 20.0).abs() < 2.0);
+        assert!((told_deg - object_deg).abs() < 1.0);
+        let Moved { told_deg, object_deg, .. } = with("control.carrying_correction_hz=1");
+        println!("{name}: corrected, the object turns by {object_deg:.2} deg, told as {told_deg:.4}");
+        assert!((told_deg - 20.0).abs() < 0.01 && (object_deg - 20.0).abs() < 1.5);
     }
 }
 
-/// Moves what a scene holds. Returns how far the frame of centres is from the way that was asked for at the end, m, by how much it has
-/// turned, and the object, degrees.
-fn moved(name: &str, settings: &[&str], order: &str, way_m: Vector3<f64>) -> (f64, f64, f64) {
+/// The end of a movement.
+struct Moved {
+    /// How far the frame of the fingertips' centres is from the way that was asked for, m.
+    off_m: f64,
+    /// By how much that has turned, and the object: as it is told, and in truth, degrees.
+    frame_deg: f64,
+    told_deg: f64,
+    object_deg: f64,
+}
+
+/// Moves what a scene holds.
+fn moved(name: &str, settings: &[&str], order: &str, way_m: Vector3<f64>) -> Moved {
     let scene = scene(name, settings, &[("grasp", None, 0.0), (order, Some("holding"), 3.0)]);
     let (mut first, mut last, mut held) = (None, None, None);
     watch(&scene, |_, simulation| {
@@ -94,12 +108,16 @@ fn moved(name: &str, settings: &[&str], order: &str, way_m: Vector3<f64>) -> (f6
     });
     let (Some(first), Some(last), Some(held)) = (first, last, held) else { panic!("no tick") };
     let turn: UnitQuaternion<f64> = last * first.inverse();
-    let frame = held.frame.pose;
-    let frame_deg = 2.0 * f64::from(frame.turn.v.norm()).asin().to_degrees();
-    ((frame.way_m.map(f64::from) - way_m).norm(), frame_deg, turn.angle().to_degrees())
+    let told = |turn: &Turn<f32>| 2.0 * f64::from(turn.v.norm()).asin().to_degrees();
+    Moved {
+        off_m: (held.frame.pose.way_m.map(f64::from) - way_m).norm(),
+        frame_deg: told(&held.frame.pose.turn),
+        told_deg: told(&held.object.turn),
+        object_deg: turn.angle().to_degrees(),
+    }
 }
 
-/// Weighed by a slow stroke, to 15 g, or a tenth of what weighs more than 150 g: with the prism, 200 g are told as 182.
+/// Weighed by a slow stroke, to 15 g.
 #[test]
 fn weight_is_told() {
     for (grams, force_n) in [(2.1, 5.0), (20.0, 5.0), (100.0, 5.0), (100.0, 10.0), (200.0, 10.0)] {
@@ -115,7 +133,7 @@ fn weight_is_told() {
         let told = weight_n / 9.81 * 1e3;
         println!("{grams} g: told as {told:.1} g");
         assert!(summary.noticed.iter().any(|(_, words)| words == Notice::Weighed.words()));
-        assert!((told - grams).abs() < f64::max(15.0, 0.1 * grams), "{grams} g: {told}");
+        assert!((told - grams).abs() < 15.0, "{grams} g: {told}");
     }
 }
 

@@ -86,6 +86,8 @@ impl CarryingConfig {
 const INTEGRAL_1_S: f32 = 2.0;
 /// Most by which the target's attitude is corrected, rad.
 const CORRECTION_MOST_RAD: f32 = 0.35;
+/// Part of its radius by which a fingertip is pressed in, at most.
+const PRESSED_MOST: f32 = 0.2;
 /// Height of the stroke of weighing, m, and its time, ms: half of it up, half down.
 const STROKE_M: f32 = 6e-3;
 const STROKE_MS: u32 = 2000;
@@ -152,6 +154,17 @@ pub(crate) struct Carry<const F: usize> {
     weight_n: f32,
 }
 
+/// Returns where the object was touched, from a fingertip's centre, m: by where that is now if it turned with the object, and if it
+/// turned with the fingertip. A fingertip that has rolled on a face by an angle has left the point of the face behind by the arc,
+/// and touches the face no higher than before; where it touched first it has lifted from the face.
+fn rolled(with_object_m: &Vector3<f32>, with_fingertip_m: &Vector3<f32>) -> Vector3<f32> {
+    let square = dot(with_object_m, with_object_m);
+    let cosine = if square > 0.0 { dot(with_object_m, with_fingertip_m) / square } else { 1.0 };
+    // The angle over its sine.
+    let arc = 1.0 + (1.0 - cosine) * (1.0 / 3.0);
+    with_object_m + (with_fingertip_m - with_object_m * cosine) * arc
+}
+
 impl<const F: usize> Carry<F> {
     pub(crate) fn new() -> Self {
         let none = Turn::none();
@@ -199,6 +212,23 @@ impl<const F: usize> Carry<F> {
         self.points = frame::Latch::of_points(&points_m, count);
         let mean = (squares / count as f32).square_root() - SHRINK_M;
         self.least_m2 = if mean > 0.0 { mean * mean * count as f32 } else { 0.0 };
+    }
+
+    /// The grasp has its full force: by as much as the fingertips have come together since the latch, on a rigid object, they are
+    /// pressed in, and roll on a radius that is shorter.
+    pub(crate) fn press_in<const J: usize>(
+        &mut self,
+        hand: &Hand<f32, J, F>,
+        posture: &Posture<f32, J, F>,
+        latch: &Latch<f32, J, F>,
+    ) {
+        let count = hand.fingertip_count();
+        let now = frame::Latch::<f32, 0, F>::of_points(&posture.centres_m, count);
+        let all = latch.frame.arms_m.iter().zip(&now.arms_m).take(count);
+        let closer_m = all.fold(0.0, |sum, (before, now)| sum + norm(before) - norm(now)) / count as f32;
+        for (touch, fingertip) in self.touches_m.iter_mut().zip(hand.prepared_fingertips()) {
+            *touch *= 1.0 - (closer_m / fingertip.radius_m).limited(0.0, PRESSED_MOST);
+        }
     }
 
     /// The weight that was weighed last, N.
@@ -256,7 +286,8 @@ impl<const F: usize> Carry<F> {
         let attitudes = posture.attitudes.iter().zip(&latch.grasp.attitudes);
         let touched = points_m.iter_mut().zip(attitudes).zip(&self.touches_m).take(hand.fingertip_count());
         for ((point, (attitude, latched)), touch) in touched {
-            *point += turn_vector(&product_transposed(attitude, latched), touch);
+            let turned = turn_vector(&product_transposed(attitude, latched), touch);
+            *point += rolled(&self.object_turn.turn(touch), &turned);
         }
         let count = hand.fingertip_count();
         let (object, _) =

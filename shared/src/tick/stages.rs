@@ -36,7 +36,7 @@ pub(super) fn object<const J: usize, const F: usize>(
                 return Some(Refusal::NoPath);
             }
             let Some(to) = angles_rad(params, state, posture) else { return Some(Refusal::NoSuchPosture) };
-            let least = least_ticks(*period, way_rad(params, state, &to), cycle.moving.speed_rad_s);
+            let least = || least_ticks(*period, way_rad(params, state, &to), cycle.moving.speed_rad_s);
             is_short(*period, time_ms, least).then_some(Refusal::TooFast)
         }
         Command::Move(movement) => {
@@ -54,7 +54,8 @@ pub(super) fn object<const J: usize, const F: usize>(
             if !(way_m <= carrying.reach_m && turn_rad <= carrying.reach_rad) {
                 return Some(Refusal::TooFar);
             }
-            is_short(*period, movement.time_ms, target_ticks(params, state, &to)).then_some(Refusal::TooFast)
+            is_short(*period, movement.time_ms, || target_ticks(params, state, &to))
+                .then_some(Refusal::TooFast)
         }
         Command::PutDown | Command::Weigh => {
             if laws.config().hold.gravity_m_s2.is_none_or(|gravity| norm(&gravity) == 0.0) {
@@ -236,6 +237,7 @@ fn hold<const J: usize, const F: usize>(params: &Params<J, F>, state: &mut State
         if carries && !supervisor.ramps(ramps) {
             supervisor.notice(Event::Firm);
             cycle.begun = Mode::Carrying;
+            cycle.carry.press_in(hand, posture, latch);
             return Some(Noticed::of_hand(Notice::Holding));
         }
         return None;
@@ -352,6 +354,6 @@ fn ticks(period: Period, time_ms: u16) -> u32 {
 }
 
 /// Returns `true` if a time is asked for that is too short.
-fn is_short(period: Period, time_ms: u16, least_ticks: u32) -> bool {
-    time_ms > 0 && ticks(period, time_ms) < least_ticks
+fn is_short(period: Period, time_ms: u16, least_ticks: impl FnOnce() -> u32) -> bool {
+    time_ms > 0 && ticks(period, time_ms) < least_ticks()
 }
