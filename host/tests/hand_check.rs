@@ -22,9 +22,14 @@ fn a_good_hand_has_exit_code_0() {
     assert_eq!(output.status.code(), Some(0));
     assert!(output.stderr.is_empty(), "{}", text(&output.stderr));
     let table = text(&output.stdout);
-    for words in
-        ["finger-1-flex-2", "47 .. 158 of 158", "348 g", "all 3 around a ball", "good: nothing found"]
-    {
+    for words in [
+        "finger-1-flex-2",
+        "47 .. 158 of 158",
+        "348 g",
+        "all 3 around a ball",
+        "presses with 0.20 N, at most 0.33 N",
+        "good: nothing found",
+    ] {
         assert!(table.contains(words), "no `{words}` in {table}");
     }
 }

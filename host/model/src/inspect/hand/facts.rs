@@ -10,6 +10,9 @@ use blindgrasp_body::MAX_JOINTS;
 use nalgebra::Vector3;
 use serde::Serialize;
 
+/// Half the width of what is grasped has to be so many times the lag of a fingertip that presses.
+const WIDTHS_PER_LAG: f64 = 5.0;
+
 /// A joint of the map.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct JointFacts {
@@ -89,6 +92,25 @@ pub struct PostureFacts {
     pub middle_m: [f64; 3],
     /// The distance of the nearest and of the farthest centre from there, m.
     pub from_middle_m: [f64; 2],
+}
+
+/// The forces of fingertips that close until they touch.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct ClosingFacts {
+    /// The posture that is looked at, in words.
+    pub posture: &'static str,
+    /// Force of a fingertip, N.
+    pub force_n: f64,
+    /// Force from which all fingertips move against the friction of their joints, N.
+    pub moving_force_n: f64,
+    /// The fingertip that needs it.
+    pub stiffest: String,
+    /// Most that a fingertip presses with while it comes to rest, N.
+    pub most_force_n: f64,
+    /// Way by which a fingertip that presses is behind its reference, m.
+    pub lag_m: f64,
+    /// Half the width of the smallest object that is found for certain, m: five times that.
+    pub least_half_width_m: f64,
 }
 
 /// The reach of a fingertip's centre.
@@ -219,6 +241,32 @@ pub(super) fn postures(specimen: &Specimen) -> Vec<PostureFacts> {
         }
     };
     specimen.file.postures.iter().map(facts).collect()
+}
+
+/// Returns how the fingertips close; `None` where they don't, or nothing moves them.
+pub(super) fn closing(specimen: &Specimen) -> Option<ClosingFacts> {
+    let control = specimen.file.control.as_ref()?;
+    let numbers = [control.closing_speed_m_s, control.closing_force_n, control.closing_stiffness_n_m];
+    if !numbers.iter().all(|number| *number > 0.0 && number.is_finite()) {
+        return None;
+    }
+    let (words, posture) = specimen.closing_posture();
+    let forces_n =
+        (0..specimen.fingers()).filter_map(|i| Some((strength::moving_force_n(specimen, &posture, i)?, i)));
+    // Of fingers that are alike, the first.
+    let (moving_force_n, stiffest) =
+        forces_n.reduce(|most, next| if next.0 > most.0 * (1.0 + 1e-9) { next } else { most })?;
+    let force_n = control.closing_force_n;
+    let lag_m = force_n / control.closing_stiffness_n_m;
+    Some(ClosingFacts {
+        posture: words,
+        force_n,
+        moving_force_n,
+        stiffest: specimen.file.fingertips[stiffest].name.clone(),
+        most_force_n: force_n + control.closing_damping_n_s_m * control.closing_speed_m_s,
+        lag_m,
+        least_half_width_m: WIDTHS_PER_LAG * lag_m,
+    })
 }
 
 /// Returns the reach of each fingertip.

@@ -23,7 +23,8 @@ use specimen::Specimen;
 use std::ffi::OsStr;
 
 pub use facts::{
-    CapsuleFacts, FingertipFacts, JointFacts, Masses, MeetingFacts, MeetingsFacts, PostureFacts, Reach,
+    CapsuleFacts, ClosingFacts, FingertipFacts, JointFacts, Masses, MeetingFacts, MeetingsFacts,
+    PostureFacts, Reach,
 };
 
 /// The findings of a check of a hand. `--json` prints it.
@@ -51,6 +52,8 @@ pub struct HandCheck {
     pub masses: Option<Masses>,
     /// The places where the fingertips meet; `None` where the tree is not known.
     pub meeting: Option<MeetingsFacts>,
+    /// The forces of fingertips that close; `None` where they don't, or the tree is not known.
+    pub closing: Option<ClosingFacts>,
     /// All that was found, the worst first.
     pub findings: Findings,
     /// For a picture.
@@ -115,6 +118,7 @@ impl HandCheck {
             reach: specimen.map_or(Vec::new(), facts::reaches),
             masses: specimen.map(facts::masses),
             meeting: meetings,
+            closing: specimen.and_then(facts::closing),
             verdict: findings.verdict(),
             counts: findings.counts(),
             findings,
@@ -168,6 +172,7 @@ fn look(specimen: &Specimen, meetings: &meeting::Meetings, found: &mut Found) {
         drive::encoders,
         gains::damping,
         gains::control,
+        gains::closing,
     ] {
         rule(specimen, found);
     }

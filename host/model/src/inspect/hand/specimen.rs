@@ -7,6 +7,9 @@ use blindgrasp_body::inverse_kinematics::is_trunk;
 use blindgrasp_body::{Capsule, Hand, MAX_JOINTS, Posture};
 use nalgebra::Vector3;
 
+/// The name of the posture from which the hands that are built in close.
+const PRESHAPE: &str = "preshape";
+
 /// The hand under inspection.
 pub(super) struct Specimen {
     /// Its file; joints that move no fingertip are left out, and numbers that nothing can be computed with are replaced.
@@ -38,6 +41,14 @@ impl Specimen {
         let own = (0..hand.fingertip_count()).map(own).collect();
         let posture = posture(&hand, &nominal_rad);
         Self { file, numbers, hand, nominal_rad, posture, own }
+    }
+
+    /// The posture from which it closes, and its name: its posture `preshape`, or without one the nominal one.
+    pub(super) fn closing_posture(&self) -> (&'static str, Posture) {
+        match self.file.postures.iter().find(|named| named.name == PRESHAPE) {
+            Some(preshape) => ("posture `preshape`", posture(&self.hand, &preshape.angles_rad)),
+            None => ("the nominal posture", self.posture.clone()),
+        }
     }
 
     /// Its surfaces, as far as their numbers can be used.

@@ -53,10 +53,28 @@ fn least(joints: &[usize], force: impl Fn(usize) -> Option<f64>) -> Option<Force
     forces.min_by(|a, b| a.force_n.total_cmp(&b.force_n))
 }
 
-/// A column of the fingertip's Jacobian, m: its velocity when this joint turns at unit speed.
+/// A column of the fingertip's Jacobian at the nominal posture, m: its velocity when this joint turns at unit speed.
 fn column(specimen: &Specimen, fingertip: usize, joint: usize) -> Vector3<f64> {
-    let pose = specimen.posture.link(joint);
-    pose.axis().cross(&(specimen.posture.centres_m[fingertip] - pose.origin_m))
+    column_at(&specimen.posture, fingertip, joint)
+}
+
+/// The same at a posture.
+fn column_at(posture: &Posture, fingertip: usize, joint: usize) -> Vector3<f64> {
+    let pose = posture.link(joint);
+    pose.axis().cross(&(posture.centres_m[fingertip] - pose.origin_m))
+}
+
+/// Returns the force towards the middle of all from which a fingertip moves at all, N: `1 / max(|J_k . t| / tau_k)`, with the Coulomb
+/// friction `tau_k` of its own joints. `None` where no joint moves it that way.
+pub(super) fn moving_force_n(specimen: &Specimen, posture: &Posture, fingertip: usize) -> Option<f64> {
+    let way = specimen.middle_m(posture) - posture.centres_m[fingertip];
+    let way = way.try_normalize(1e-6 * specimen.mean_radius_m())?;
+    let force_n = |&k: &usize| {
+        let lever_m = column_at(posture, fingertip, k).dot(&way).abs();
+        let friction_nm = specimen.file.joints[k].coulomb_friction_nm;
+        (lever_m > 1e-9 * specimen.span_m()).then(|| friction_nm / lever_m)
+    };
+    specimen.own[fingertip].iter().filter_map(force_n).min_by(f64::total_cmp)
 }
 
 /// Returns the distance of a fingertip from the axis of a joint at the nominal posture, m.
@@ -136,6 +154,24 @@ mod tests {
                 let within = |&k: &usize| (torques[k] + weight[k]).abs() <= 1.3878 * (1.0 + 1e-12);
                 assert!(hand.own[i].iter().all(within));
             }
+        }
+    }
+
+    /// From the force found on, the joint that gives way first has its friction's torque, and no other has more than its own.
+    #[test]
+    fn a_finger_moves_from_the_force_found_on() {
+        let mut hand = specimen("three-finger");
+        for (k, joint) in hand.file.joints.iter_mut().enumerate() {
+            joint.coulomb_friction_nm *= 1.0 + 0.1 * k as f64;
+        }
+        let preshape = hand.closing_posture().1;
+        for i in 0..3 {
+            let force_n = moving_force_n(&hand, &preshape, i).unwrap();
+            let way = (hand.middle_m(&preshape) - preshape.centres_m[i]).normalize();
+            let torques_nm = hand.hand.jacobians(&preshape, i).0.tr_mul(&(way * force_n));
+            let used =
+                hand.own[i].iter().map(|&k| torques_nm[k].abs() / hand.file.joints[k].coulomb_friction_nm);
+            assert!((used.fold(0.0, f64::max) - 1.0).abs() < 1e-12, "fingertip {i}: {force_n} N");
         }
     }
 

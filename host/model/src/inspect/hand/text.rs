@@ -195,6 +195,19 @@ fn totals(check: &HandCheck, text: &mut String) {
             format!("{name}: fingertips {nearest:.0} .. {farthest:.0} mm from their middle at {middle}");
         line(if k == 0 { "postures" } else { "" }, words);
     }
+    if let Some(closing) = &check.closing {
+        let words = format!(
+            "presses with {} N, at most {} N as it meets something; `{}` moves from {} N on ({})",
+            figures(closing.force_n),
+            figures(closing.most_force_n),
+            closing.stiffest,
+            figures(closing.moving_force_n),
+            closing.posture
+        );
+        line("closing", words);
+        let (lag, width) = (length(closing.lag_m), length(2.0 * closing.least_half_width_m));
+        line("", format!("is behind its reference by {lag} then: for objects of {width} and more"));
+    }
 }
 
 /// Three digits or more.

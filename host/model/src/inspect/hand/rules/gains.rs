@@ -1,9 +1,16 @@
 //! The gains of the law against the hand that they are for.
 
+use super::super::facts::{self, ClosingFacts};
 use super::super::found::Found;
 use super::super::specimen::Specimen;
 use super::super::strength;
+use super::length;
 use crate::inspect::finding::{Finding, Severity};
+
+/// Least force of fingertips that close, as a multiple of the one from which they move at all, ...
+const MOVES_FOR_CERTAIN: f64 = 2.5;
+/// ... and a good one.
+const MOVES_WELL: f64 = 5.0;
 
 /// Joints that nothing damps: the law takes energy out of a grasp by `C` of Eq. 30 alone.
 pub(in super::super) fn damping(specimen: &Specimen, found: &mut Found) {
@@ -42,6 +49,51 @@ pub(in super::super) fn control(specimen: &Specimen, found: &mut Found) {
             let remedy = "if it was not meant, less K_st or more f_d: Eq. 49 is a sizing rule";
             found.push(tell(Severity::Notice, "attitude_stiffness_nm", what, remedy));
         }
+    }
+}
+
+/// Finds fingertips that close with too little force to move for certain, or with a spring too soft for what they shall find.
+///
+/// A finger that hardly overcomes its joints' friction stops where nothing is, and tells a touch. One whose reference gets to the
+/// middle of all before it presses with its force tells none: then the hand says that it is empty, with something in it.
+pub(in super::super) fn closing(specimen: &Specimen, found: &mut Found) {
+    let trusted =
+        ["offset_m", "axis", "rotation_rpy_rad", "radius_m", "limits_rad", "nominal_rad", "angles_rad"];
+    let Some(closing) = facts::closing(specimen).filter(|_| found.trusts(&trusted)) else { return };
+    let tell = |key: &str, what: String, remedy: String| {
+        Finding::new(Severity::Warning, what, remedy).about("[control]").key(format!("control.{key}"))
+    };
+    let ClosingFacts { force_n, moving_force_n, lag_m, least_half_width_m, .. } = closing;
+    let is_trusted = found.trusts(&["coulomb_friction_nm", "closing_force_n"]);
+    if is_trusted && force_n < MOVES_FOR_CERTAIN * moving_force_n {
+        let what = format!(
+            "fingertips close with {force_n} N, {:.1} times the {moving_force_n:.3} N from which `{}` moves against the friction \
+             of its joints at {}",
+            force_n / moving_force_n,
+            closing.stiffest,
+            closing.posture
+        );
+        let remedy = format!(
+            "give at least {MOVES_FOR_CERTAIN} times ({:.3} N), better {MOVES_WELL} times ({:.3} N)",
+            MOVES_FOR_CERTAIN * moving_force_n,
+            MOVES_WELL * moving_force_n
+        );
+        found.push(tell("closing_force_n", what, remedy));
+    }
+    let size_m = 2.0 * specimen.mean_radius_m();
+    if found.trusts(&["closing_force_n", "closing_stiffness_n_m"]) && least_half_width_m > size_m {
+        let what = format!(
+            "a fingertip that presses with {force_n} N is {} behind its reference: more than a fifth of half the width of \
+             objects below {}",
+            length(lag_m),
+            length(2.0 * least_half_width_m)
+        );
+        let remedy = format!(
+            "give at least {:.0} N/m, for objects from twice the size of a fingertip ({}) on",
+            (force_n * least_half_width_m / (lag_m * size_m)).ceil(),
+            length(2.0 * size_m)
+        );
+        found.push(tell("closing_stiffness_n_m", what, remedy));
     }
 }
 

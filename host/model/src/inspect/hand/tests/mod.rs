@@ -78,7 +78,7 @@ fn json_has_these_keys() {
     let check = serde_json::to_value(HandCheck::load("three-finger").unwrap()).unwrap();
     assert_eq!(
         keys(&check),
-        "capsules counts description findings fingertips joints masses meeting name postures reach verdict"
+        "capsules closing counts description findings fingertips joints masses meeting name postures reach verdict"
     );
     assert_eq!(
         keys(&check["joints"][0]),
@@ -97,6 +97,10 @@ fn json_has_these_keys() {
     assert_eq!(keys(&check["postures"][0]), "angles_rad from_middle_m middle_m name");
     assert_eq!(keys(&check["masses"]), "centre_m fingers_kg total_kg trunk_kg");
     assert_eq!(keys(&check["meeting"]["all"]), "ball_radius_m centre_m fingertips");
+    assert_eq!(
+        keys(&check["closing"]),
+        "force_n lag_m least_half_width_m most_force_n moving_force_n posture stiffest"
+    );
     assert_eq!(check["verdict"], "good");
     assert_eq!(check["findings"].as_array().map(Vec::len), Some(0));
 }
