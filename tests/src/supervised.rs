@@ -69,6 +69,7 @@ pub struct Turned {
 }
 
 /// The controller.
+#[derive(Clone, Debug)]
 struct Supervised {
     params: Params<MAX_JOINTS, MAX_FINGERS>,
     state: State<MAX_JOINTS, MAX_FINGERS>,
@@ -176,6 +177,16 @@ pub fn run(scene: &Scene, course: &Course) -> Outcome {
 /// Runs a course with a configuration of one's own.
 pub fn run_with(scene: &Scene, config: &Config<MAX_JOINTS>, course: &Course) -> Outcome {
     let params = Params::new(scene.hand.cast(), config).unwrap_or_else(|error| panic!("{error}"));
+    let mut simulation = simulation(scene, params, course);
+    let Ok(run) = simulation.try_run();
+    Outcome { run, turned: simulation.controller().turned.clone() }
+}
+
+fn simulation(
+    scene: &Scene,
+    params: Params<MAX_JOINTS, MAX_FINGERS>,
+    course: &Course,
+) -> Simulation<Supervised> {
     let controller =
         Supervised { params, state: State::new(), course: course.clone(), tick: None, turned: Vec::new() };
     let mut simulation =
@@ -183,8 +194,61 @@ pub fn run_with(scene: &Scene, config: &Config<MAX_JOINTS>, course: &Course) -> 
     for injection in &course.injections {
         simulation.inject(*injection);
     }
-    let Ok(run) = simulation.try_run();
-    Outcome { run, turned: simulation.controller().turned.clone() }
+    simulation
+}
+
+/// An instant of a run, from which several courses can be tried.
+#[derive(Clone, Debug)]
+pub struct Instant<'a> {
+    scene: &'a Scene,
+    simulation: Simulation<Supervised>,
+}
+
+impl<'a> Instant<'a> {
+    /// The beginning of a scene with a script, whose hand knows its postures.
+    pub fn beginning(scene: &'a Scene) -> Self {
+        let mut simulation = simulation(scene, with_postures(scene, &config(scene)), &Course::default());
+        simulation.outlive_the_loss();
+        Self { scene, simulation }
+    }
+
+    /// Goes on by a tick. Returns its mode; `None` at the end.
+    pub fn step(&mut self) -> Option<Mode> {
+        let Ok(step) = self.simulation.step();
+        step?;
+        let turned = &mut self.simulation.controller_mut().turned;
+        let mode = turned.last().map_or(Mode::Armed, |turned| turned.mode);
+        turned.clear();
+        Some(mode)
+    }
+
+    /// Tries a course from here on with a configuration, for so many ticks. Its ticks, and those of the outcome, count from here; the
+    /// object may be lost meanwhile.
+    pub fn then(&self, config: &Config<MAX_JOINTS>, course: &Course, ticks: usize) -> Outcome {
+        let mut simulation = self.simulation.clone();
+        let controller = simulation.controller_mut();
+        let here = controller.tick.replace(0).unwrap_or(0);
+        controller.course = course.clone();
+        controller.params = with_postures(self.scene, config);
+        for injection in &course.injections {
+            simulation.inject(Injection { at_tick: here + injection.at_tick, ..*injection });
+        }
+        let mut samples = Vec::with_capacity(ticks);
+        while samples.len() < ticks {
+            let Ok(step) = simulation.step();
+            let Some(step) = step else { break };
+            samples.extend(step.sample.cloned());
+        }
+        let turned = simulation.controller().turned.clone();
+        let first_fault = (0..).zip(&turned).find_map(|(tick, turned)| Some((tick, turned.fault?)));
+        Outcome { run: Run { samples, first_fault, summary: simulation.summary() }, turned }
+    }
+}
+
+fn with_postures(scene: &Scene, config: &Config<MAX_JOINTS>) -> Params<MAX_JOINTS, MAX_FINGERS> {
+    Params::new(scene.hand.cast(), config)
+        .and_then(|params| params.with_postures(scene.named_postures()))
+        .unwrap_or_else(|error| panic!("{error}"))
 }
 
 /// Joint torques, N m, of a force on the centre of a fingertip, N, in the base frame, with the hand as the scene starts it.

@@ -38,7 +38,7 @@ const INSTANTS: [u64; 2] = [150, 1000];
 const JOINTS: usize = 12;
 
 /// The range of no number: what is added to it is all there is.
-const NEVER: RangeInclusive<u64> = RangeInclusive::new(u64::MAX, 0);
+pub(crate) const NEVER: RangeInclusive<u64> = RangeInclusive::new(u64::MAX, 0);
 
 /// The results of one fault, over all joints and instants.
 struct Row {
@@ -59,16 +59,18 @@ impl Row {
     }
 
     fn add(&mut self, since: u64, at: u64, ending: &End) {
-        let widen = |range: &mut RangeInclusive<u64>, value: u64| {
-            *range = value.min(*range.start())..=value.max(*range.end());
-        };
         widen(&mut self.found, at - since);
         widen(&mut self.off, ending.off);
         self.fastest_rad_s = self.fastest_rad_s.max(ending.fastest_rad_s);
     }
 }
 
-fn in_words(range: &RangeInclusive<u64>) -> String {
+/// Takes a number into a range.
+pub(crate) fn widen(range: &mut RangeInclusive<u64>, value: u64) {
+    *range = value.min(*range.start())..=value.max(*range.end());
+}
+
+pub(crate) fn in_words(range: &RangeInclusive<u64>) -> String {
     match (range.start(), range.end()) {
         (least, most) if least == most => least.to_string(),
         (least, most) => format!("{least} to {most}"),
@@ -76,23 +78,23 @@ fn in_words(range: &RangeInclusive<u64>) -> String {
 }
 
 /// The course of the torque.
-struct End {
-    off: u64,
-    fastest_rad_s: f64,
+pub(crate) struct End {
+    pub(crate) off: u64,
+    pub(crate) fastest_rad_s: f64,
 }
 
-fn largest(values: impl IntoIterator<Item = f64>) -> f64 {
+pub(crate) fn largest(values: impl IntoIterator<Item = f64>) -> f64 {
     values.into_iter().fold(0.0, f64::max)
 }
 
 /// Fastest joint of the plant in samples from one on, rad/s.
-fn fastest_rad_s(outcome: &Outcome, from: u64) -> f64 {
+pub(crate) fn fastest_rad_s(outcome: &Outcome, from: u64) -> f64 {
     let samples = outcome.run.samples.iter().skip(from as usize);
     largest(samples.flat_map(|sample| sample.speeds_rad_s.iter().map(|speed| speed.abs())))
 }
 
 /// Ticks from the one that found the fault until the joints have no torque.
-fn off(outcome: &Outcome, at: u64) -> u64 {
+pub(crate) fn off(outcome: &Outcome, at: u64) -> u64 {
     let without = |torques: &[f64]| torques.iter().all(|&torque| torque == 0.0);
     let samples = &outcome.run.samples[at as usize..];
     let off = samples.iter().position(|sample| without(&sample.torques_nm)).expect("the torque goes");
@@ -111,7 +113,7 @@ fn energy_falls(scene: &Scene, outcome: &Outcome, from: u64) {
 }
 
 /// Largest change of a joint's torque from one tick to the next, N m, in the ticks before one.
-fn joint_step_nm(outcome: &Outcome, until: usize, joint: usize) -> f64 {
+pub(crate) fn joint_step_nm(outcome: &Outcome, until: usize, joint: usize) -> f64 {
     let pairs = outcome.turned[..until].windows(2);
     largest(pairs.map(|pair| f64::from((pair[1].torques_nm[joint] - pair[0].torques_nm[joint]).abs())))
 }
@@ -288,11 +290,11 @@ fn saturated_torques() -> Row {
     row
 }
 
-/// Somebody bends a finger, with a torque at its knuckle.
-fn bent(joint: usize, torque_nm: f32) -> Course {
+/// Somebody bends a finger for half a second, with a torque at its knuckle.
+pub(crate) fn bent(at_tick: u64, joint: usize, torque_nm: f32) -> Course {
     let mut push_nm = [0.0; MAX_JOINTS];
     push_nm[joint] = torque_nm;
-    Course { pushes: vec![(1000..1500, push_nm)], ..Course::default() }
+    Course { pushes: vec![(at_tick..at_tick + 500, push_nm)], ..Course::default() }
 }
 
 /// The first sample of which something is true, as a tick.
@@ -309,21 +311,21 @@ fn bent_fingers() -> Row {
         config.faults.frozen_ms = None;
         let slack_rad = f64::from(config.faults.range_slack_rad.expect("it is watched"));
         for joint in [1, 5, 9] {
-            let course = bent(joint, -0.3);
+            let course = bent(1000, joint, -0.3);
             let outcome = run_with(&scene, &config, &course);
             let at = found(&outcome, Fault::BeyondRange, Some(joint));
             let (lower_rad, _) = scene.hand.range_rad(joint);
             let since = since(&outcome, |sample| sample.angles_rad[joint] < lower_rad - slack_rad);
-            row.add(since, at, &pushed_off(&outcome, &course, at));
+            row.add(since, at, &pushed_off(&outcome, &course, at, Mode::Fault));
         }
     }
     row
 }
 
 /// As [`falls_off`], while somebody still pushes: energy comes in, and nothing but the push is on the joints.
-fn pushed_off(outcome: &Outcome, course: &Course, at: u64) -> End {
+pub(crate) fn pushed_off(outcome: &Outcome, course: &Course, at: u64, mode: Mode) -> End {
     for turned in &outcome.turned[at as usize..] {
-        assert_eq!(turned.mode, Mode::Fault);
+        assert_eq!(turned.mode, mode);
         assert!(turned.torques_nm.iter().all(|&torque| torque == 0.0));
     }
     let alone = |tick: &u64| {
@@ -358,11 +360,11 @@ fn fast_joints() -> Row {
         let (scene, _) = healthy(name);
         let config = changed(&scene, |config| config.faults.speed_limit_rad_s = Some([2.0; MAX_JOINTS]));
         for joint in [1, 5, 9] {
-            let course = bent(joint, -0.3);
+            let course = bent(1000, joint, -0.3);
             let outcome = run_with(&scene, &config, &course);
             let at = found(&outcome, Fault::Overspeed, None);
             let since = since(&outcome, |sample| sample.speeds_rad_s.iter().any(|speed| speed.abs() > 2.0));
-            row.add(since, at, &pushed_off(&outcome, &course, at));
+            row.add(since, at, &pushed_off(&outcome, &course, at, Mode::Fault));
         }
     }
     row
@@ -609,7 +611,7 @@ fn push(name: &str) -> Pushed {
             pushed_hands.frozen_step_nm = pushed_hands.frozen_step_nm.max(step_nm(&outcome));
             match outcome.found() {
                 Some((at, raised)) if raised == Raised::at(joint, Fault::CounterFrozen) => {
-                    pushed_off(&outcome, &course, at);
+                    pushed_off(&outcome, &course, at, Mode::Fault);
                     pushed_hands.right.push(at - 800);
                 }
                 Some((_, raised)) if is_frozen(raised) => pushed_hands.wrong += 1,

@@ -5,6 +5,7 @@ mod carried;
 mod constraints;
 mod control;
 mod coulomb;
+mod cycle_faults;
 mod documents;
 mod dynamics;
 mod earlier_law;

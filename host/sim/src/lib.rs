@@ -88,7 +88,8 @@ pub struct Run {
 }
 
 /// A scene with a controller, as a stream of [`Step`]s. Nothing of a step is kept but what the verdict needs, so that an hour
-/// takes no more memory than a second.
+/// takes no more memory than a second. A clone goes on from the same instant.
+#[derive(Clone, Debug)]
 pub struct Simulation<C = Alone> {
     name: String,
     joint_names: Vec<String>,
@@ -122,6 +123,8 @@ pub struct Simulation<C = Alone> {
     first_fault: Option<(u64, Raised)>,
     fault: Option<Raised>,
     lost: Option<(f64, Lost)>,
+    /// It goes on where an object with friction is lost.
+    outlives: bool,
     computing: Duration,
 }
 
@@ -175,6 +178,7 @@ impl<C: Controller> Simulation<C> {
             first_fault: None,
             fault: None,
             lost: None,
+            outlives: false,
             computing: Duration::ZERO,
         })
     }
@@ -194,9 +198,19 @@ impl<C: Controller> Simulation<C> {
         self.injections.push(injection);
     }
 
+    /// Goes on after an object with friction is lost, to see what the hand then does.
+    pub fn outlive_the_loss(&mut self) {
+        self.outlives = matches!(self.plant, Plant::Coulomb(_));
+    }
+
     /// The controller.
     pub fn controller(&self) -> &C {
         &self.controller
+    }
+
+    /// The controller, to be changed between two steps.
+    pub fn controller_mut(&mut self) -> &mut C {
+        &mut self.controller
     }
 
     /// The plant as it is.
@@ -214,7 +228,7 @@ impl<C: Controller> Simulation<C> {
             self.delay = Some(Delay::new(self.delay_ticks, armed.torques_nm));
             return Ok(Some(Step { t_s: 0.0, controller: &self.controller, sample: None }));
         }
-        if self.lost.is_some() || self.tick > self.ticks {
+        if (self.lost.is_some() && !self.outlives) || self.tick > self.ticks {
             return Ok(None);
         }
         let begun = Instant::now();
@@ -329,10 +343,11 @@ impl<C: Controller> Simulation<C> {
             sample = is_due.then(|| observer.sample(t_s, plant, &seen));
             gone = judge.see(plant, stepped.mode);
         });
-        self.lost = moved.err().map_or(gone.map(|lost| (t_s, lost)), |(substep, lost)| {
+        let lost = moved.err().map_or(gone.map(|lost| (t_s, lost)), |(substep, lost)| {
             let at_s = (self.period_us * substep as u64) as f64 / (1e6 * self.motors.substeps as f64);
             Some((t_s + at_s, lost))
         });
+        self.lost = self.lost.or(lost);
         let Some(sample) = sample else { return false };
         self.tally.see(&sample);
         self.last = Some(sample);
