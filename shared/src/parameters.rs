@@ -143,6 +143,7 @@ parameters! {
     CARRYING_TURN_SPEED, Hand, AtMost, "carrying.speed_rad_s",         "rad/s",     "Largest angular speed of what is held",                     cycle.carrying.speed_rad_s;
     CARRYING_INTEGRAL, Hand, AtMost,  "carrying.integral_n",           "N",         "Most force of the integral that keeps what is held in its place", cycle.carrying.integral_n;
     CARRYING_CORRECTION, Hand, Free,  "carrying.correction_hz",        "Hz",        "Rate at which the target follows what rolling fingertips tell of the turn", cycle.carrying.correction_hz;
+    CARRYING_STILL,   Hand,  Free,    "carrying.still_m",              "m",         "Way that is left which integral and correction leave alone", cycle.carrying.still_m;
     PUT_DOWN_SPEED,   Hand,  AtMost,  "carrying.put_down_m_s",         "m/s",       "Speed at which something is put down",                      cycle.carrying.put_down_m_s;
     PUT_DOWN_DEPTH,   Hand,  AtMost,  "carrying.put_down_m",           "m",         "Depth below where the grasp began to which something is put down", cycle.carrying.put_down_m;
     PUT_DOWN_FORCE,   Hand,  AtMost,  "carrying.put_down_n",           "N",         "Force on what is below at which something is put down",     cycle.carrying.put_down_n;

@@ -40,9 +40,9 @@ const LIFTED: [(&str, Option<&str>, f64); 2] =
     [("posture preshape", None, 0.0), ("grasp", Some("in-posture"), 0.0)];
 
 /// The arm's joints take part, by 0.2 m and 30 degrees: at rest the frame of the fingertips' centres is there. (Advantage 6 of the paper.)
-/// With joints in the fingers alone it is not, uncorrected, by a millimetre and some degrees: they can't keep all fingertips' attitudes to
-/// each other, which `u_st` holds, while they turn the object. There the slow correction makes the *object's* turn right: as the rolling
-/// fingertips tell it to 0.01 degrees, and in truth to 1.5.
+/// With joints in the fingers alone it is not, uncorrected, by a millimetre and some degrees: fingertips that can't turn along roll, the
+/// object turns further than they do, and the pull of `u_s` resists that. There the slow correction makes the *object's* turn right: as the
+/// rolling fingertips tell it to 0.01 degrees, and in truth to 1.5.
 #[test]
 fn what_is_held_goes_where_it_is_asked_to() {
     let way = Vector3::new(-0.1, 0.1, 0.14);
@@ -68,6 +68,7 @@ fn what_is_held_goes_where_it_is_asked_to() {
                 "control.soft_start_s=0.2",
                 "control.frame_stiffness_n_m=300",
                 "control.frame_turn_stiffness_nm=0.3",
+                "control.carrying_still_m=0",
                 correction,
                 "duration_s=30",
             ];

@@ -138,6 +138,7 @@ impl Setup<'_> {
                 speed_rad_s: control.carrying_speed_rad_s as f32,
                 integral_n: control.carrying_integral_n as f32,
                 correction_hz: control.carrying_correction_hz as f32,
+                still_m: control.carrying_still_m as f32,
                 put_down_m_s: control.carrying_put_down_m_s as f32,
                 put_down_m: control.carrying_put_down_m as f32,
                 put_down_n: control.carrying_put_down_n as f32,

@@ -38,6 +38,9 @@ pub struct CarryingConfig {
     pub integral_n: f32,
     /// Rate at which the target follows what the fingertips tell of the object's turn, Hz; 0 leaves it alone.
     pub correction_hz: f32,
+    /// Way that is left, along each axis, which both leave alone, m, and the turn that this is 40 mm away: where joints stick, they
+    /// would wind up and let go again, for ever.
+    pub still_m: f32,
     /// Speed at which an object is put down, m/s.
     pub put_down_m_s: f32,
     /// Depth below where the grasp began to which it is put down, m.
@@ -55,6 +58,7 @@ impl CarryingConfig {
         speed_rad_s: 0.0,
         integral_n: 0.0,
         correction_hz: 0.0,
+        still_m: 0.0,
         put_down_m_s: 0.0,
         put_down_m: 0.0,
         put_down_n: 0.0,
@@ -68,6 +72,7 @@ impl CarryingConfig {
             ("carrying.speed_rad_s", self.speed_rad_s),
             ("carrying.integral_n", self.integral_n),
             ("carrying.correction_hz", self.correction_hz),
+            ("carrying.still_m", self.still_m),
             ("carrying.put_down_m_s", self.put_down_m_s),
             ("carrying.put_down_m", self.put_down_m),
             ("carrying.put_down_n", self.put_down_n),
@@ -84,6 +89,8 @@ impl CarryingConfig {
 
 /// Rate at which the integral takes away the way that is left, 1/s.
 const INTEGRAL_1_S: f32 = 2.0;
+/// Turn that counts as much as a way, rad/m: that of fingertips 40 mm from the middle.
+const STILL_RAD_M: f32 = 25.0;
 /// Most by which the target's attitude is corrected, rad.
 const CORRECTION_MOST_RAD: f32 = 0.35;
 /// Part of its radius by which a fingertip is pressed in, at most.
@@ -309,7 +316,8 @@ impl<const F: usize> Carry<F> {
             // From the middle of the points of touch, not from that of the centres.
             let about = about + latch.frame.centroid_m - self.points.centroid_m;
             let left_m = way + about - goal.turn(&about) - upwards * self.sunk_m - object.way_m;
-            self.integral_m += left_m * (INTEGRAL_1_S * period_s);
+            let beyond = |left: f32, still: f32| left - left.limited(-still, still);
+            self.integral_m += left_m.map(|left| beyond(left, config.still_m)) * (INTEGRAL_1_S * period_s);
             let square = dot(&self.integral_m, &self.integral_m);
             if square > most * most {
                 self.integral_m *= most / square.square_root();
@@ -317,7 +325,9 @@ impl<const F: usize> Carry<F> {
             let left = object.turn.inverse().then(&goal).shorter().v * 2.0;
             let rate = config.correction_hz * (core::f32::consts::TAU * period_s);
             let most = CORRECTION_MOST_RAD;
-            self.correction_rad = (self.correction_rad + left * rate).map(|v| v.limited(-most, most));
+            let still_rad = config.still_m * STILL_RAD_M;
+            self.correction_rad = (self.correction_rad + left.map(|left| beyond(left, still_rad)) * rate)
+                .map(|v| v.limited(-most, most));
         }
         way_m += self.integral_m;
         let ticks = |time_ms: u32| (time_ms * 1000 / period.microseconds()).max(1);

@@ -280,7 +280,7 @@ fn centroid_m<const J: usize, const F: usize>(
     sum * (1.0 / count as f32)
 }
 
-/// Returns `true` if two fingertips have no room for an object between them.
+/// Returns `true` if two fingertips have no room for an object between them. Neighbours on the same side of what is held may be as close.
 pub(super) fn are_close<const J: usize, const F: usize>(
     hand: &Hand<f32, J, F>,
     posture: &Posture<f32, J, F>,
@@ -290,7 +290,10 @@ pub(super) fn are_close<const J: usize, const F: usize>(
         fingertips.iter().zip(&posture.centres_m).take(i).any(|(other, neighbour)| {
             let between = centre - neighbour;
             let least = one.radius_m + other.radius_m + NO_OBJECT_M;
-            dot(&between, &between) < least * least
+            dot(&between, &between) < least * least && {
+                let middle = centroid_m(hand, posture);
+                dot(&(centre - middle), &(neighbour - middle)) < 0.0
+            }
         })
     })
 }

@@ -144,6 +144,7 @@ pub(crate) fn cycle_config<const J: usize>() -> Config<J> {
                 speed_m_s: 0.1,
                 speed_rad_s: 1.0,
                 integral_n: 4.0,
+                still_m: 3e-4,
                 correction_hz: 1.0,
                 put_down_m_s: 0.01,
                 put_down_m: 0.01,

@@ -125,6 +125,8 @@ control! {
     carrying_correction_hz: f64 = 1.0;
     /// Speed at which something is put down, m/s.
     carrying_put_down_m_s: f64 = 0.01;
+    /// Way that is left, along each axis, which integral and correction leave alone, m, and the turn that this is 40 mm away.
+    carrying_still_m: f64 = 3e-4;
     /// Depth below where the grasp began to which something is put down, m.
     carrying_put_down_m: f64 = 0.01;
     /// Force on what is below at which something is put down, N.

@@ -31,6 +31,15 @@ pub(super) const DAMPING_RULE: &str = "\
 0.02 of the critical damping 2 sqrt(K H) of each joint alone. H is its inertia,
 #   K = force_n / sum(radius_m) * (1 - 1/fingertips) * lever^2 the stiffness that the law gives it. A joint that moves several
 #   fingertips, which no force of the grasp holds: H * 2/s. Both in the nominal posture.";
+/// Least force with which a fingertip closes, N; and how far its spring then lags behind, m: with less than what overcomes dry friction
+/// five times a finger hardly moves.
+const CLOSING_N: f64 = 0.2;
+pub(super) const CLOSING_LAG_M: f64 = 3.3e-3;
+pub(super) const CLOSING_FRICTIONS: f64 = 5.0;
+/// Way by which an object is off where the virtual frame pulls it with the force of the grasp, m: 600 N/m in the three-finger hand.
+pub(super) const FRAME_WAY_M: f64 = 8e-3;
+/// Distance of the fingertips from their centroid that its stiffness against turning is for, in their radii.
+pub(super) const FRAME_RADII: f64 = 2.5;
 /// Share of the weakest joint's torque that the force takes.
 const FORCE_SHARE: f64 = 0.5;
 /// Part of critical damping.
@@ -59,6 +68,10 @@ pub(super) struct Gains {
     /// The force that this joint would allow, if it is far more than the finger weighs.
     pub(super) allowed_n: Option<f64>,
     pub(super) attitude_stiffness_nm: f64,
+    /// Force with which a fingertip closes, N; none with an arm, of whose closing nothing is known.
+    pub(super) closing_n: Option<f64>,
+    /// Stiffnesses of the virtual frame, N/m and N m; none with an arm, and where the loop has no margin with them.
+    pub(super) frame: Option<[f64; 2]>,
     pub(super) joints: Vec<JointGains>,
     /// Bandwidth of the estimator, Hz.
     pub(super) bandwidth_hz: f64,
@@ -113,6 +126,8 @@ impl Gains {
             weakest: 0,
             allowed_n: None,
             attitude_stiffness_nm: 1.0,
+            closing_n: None,
+            frame: None,
             joints: vec![joint; draft.needs.len()],
             bandwidth_hz: BANDWIDTH_HZ,
             is_tuned: false,
@@ -155,7 +170,7 @@ impl Gains {
         let force_n = rounded(allowed.min(most));
         let radii: f64 = draft.radii_m.iter().sum();
         let tips = draft.tips.len() as f64;
-        let joints = (0..count)
+        let joints: Vec<JointGains> = (0..count)
             .map(|k| {
                 let inertia = measures.inertias_kg_m2[k];
                 let most = FASTEST_DAMPING_HZ * measures.alone_kg_m2[k];
@@ -187,8 +202,20 @@ impl Gains {
             let indentation = INDENTATION * radius;
             rounded(force_n / (indentation * indentation))
         };
+        // The force at a fingertip from which on one of its finger's joints slides.
+        let slides_n = |tip: usize| {
+            let of_its_finger = (0..count).filter(|k| presses(k) && hand.moves(*k, tip));
+            of_its_finger.map(|k| joints[k].coulomb_nm / measures.levers_m[k]).fold(f64::INFINITY, f64::min)
+        };
+        let slide_n = (0..draft.tips.len()).map(slides_n).filter(|n| n.is_finite()).fold(0.0, f64::max);
+        let frame_n_m = rounded(force_n / FRAME_WAY_M);
+        let arm_m = FRAME_RADII * radii / tips;
+        let is_alone = (0..count).all(|k| own(&k));
         Ok(Self {
             force_n,
+            closing_n: is_alone
+                .then(|| rounded(f64::max(CLOSING_N, CLOSING_FRICTIONS * slide_n).min(0.5 * force_n))),
+            frame: is_alone.then(|| [frame_n_m, rounded(frame_n_m * arm_m * arm_m)]),
             weakest,
             allowed_n: (allowed > most).then(|| rounded(allowed)),
             attitude_stiffness_nm: rounded(force_n * radii / tips / RADII),

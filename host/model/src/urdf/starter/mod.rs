@@ -93,8 +93,15 @@ impl StarterRequest {
         let (model, file) = self.hand(&draft.write(&Gains::preliminary(&draft), &Surfaces::default()))?;
         let mut gains = Gains::new(&draft, &file, &model.hand)?;
         let mut surfaces = Surfaces::of(&draft, path.parent().unwrap_or(Path::new("")));
-        let (model, file) = self.hand(&draft.write(&gains, &surfaces))?;
-        tune(&model, &file).iter().for_each(|tuned| gains.tune(tuned));
+        let (mut model, file) = self.hand(&draft.write(&gains, &surfaces))?;
+        let mut tuned = tune(&model, &file);
+        if tuned.is_none() {
+            gains.frame = None;
+            let without;
+            (model, without) = self.hand(&draft.write(&gains, &surfaces))?;
+            tuned = tune(&model, &without);
+        }
+        tuned.iter().for_each(|tuned| gains.tune(tuned));
         let HandModel { hand, mut warnings, .. } = model;
         let mut guesses = draft.guesses(&gains);
         guesses.extend(surfaces.guess());

@@ -180,8 +180,11 @@ impl<'a> Draft<'a> {
             guesses.push(format!("force: {}", self.force_rule(gains)));
         }
         guesses.push(format!(
-            "gains: force {:?} N, attitude stiffness {:?} N m, damping; encoders; torques per volt; stiffness of the fingertips",
-            gains.force_n, gains.attitude_stiffness_nm
+            "gains: force {:?} N, attitude stiffness {:?} N m, {}{}damping; encoders; torques per volt; stiffness of the fingertips",
+            gains.force_n,
+            gains.attitude_stiffness_nm,
+            if gains.closing_n.is_some() { "closing, " } else { "" },
+            if gains.frame.is_some() { "virtual frame, " } else { "" },
         ));
         guesses
     }
@@ -226,6 +229,30 @@ impl<'a> Draft<'a> {
                 let _ = write!(text, "\n[urdf.{list}]\n{}\n", entries.join("\n"));
             }
         }
+        let mut cycle = String::new();
+        if let Some(closing_n) = gains.closing_n {
+            let _ = write!(
+                cycle,
+                "# GUESS: a fingertip closes with {} times what overcomes the dry friction of its finger, {:?} m behind where it is to be.\n\
+                 closing_speed_m_s = 0.05\n\
+                 closing_force_n = {closing_n:?}\n\
+                 closing_stiffness_n_m = {:?}\n",
+                gains::CLOSING_FRICTIONS,
+                gains::CLOSING_LAG_M,
+                gains::rounded(closing_n / gains::CLOSING_LAG_M),
+            );
+        }
+        if let Some([way_n_m, turn_nm]) = gains.frame {
+            let _ = write!(
+                cycle,
+                "# GUESS: what is held is pulled to its place with force_n where it is {:?} m off; turned, as far as that is {} fingertips' radii\n\
+                 # from its middle.\n\
+                 frame_stiffness_n_m = {way_n_m:?}\n\
+                 frame_turn_stiffness_nm = {turn_nm:?}\n",
+                gains::FRAME_WAY_M,
+                gains::FRAME_RADII,
+            );
+        }
         let _ = write!(
             text,
             "\n# Of the firmware; a start for the [control] of a scene too.\n\
@@ -239,7 +266,8 @@ impl<'a> Draft<'a> {
              soft_start_s = 0.3\n\
              amplifier_start_ms = 0                # whole ms from power to torque, by the amplifiers' data sheet; over the line it can only be made longer\n\
              {}estimator_bandwidth_hz = {:?}\n\
-             end_stops = true\n\n\
+             end_stops = true\n\
+             {}\n\
              [joint_defaults]\n\
              encoder_counts_per_turn = 16384       # GUESS: 14 bits a turn of the joint; with a gear, motor counts times its ratio\n\
              encoder_reversed = false              # true for a joint whose count falls while it turns in its positive direction\n\
@@ -261,6 +289,7 @@ impl<'a> Draft<'a> {
             gains.attitude_stiffness_nm,
             if gains.is_tuned { "# GUESS: tuned, see damping_gain_nm_s_rad.\n" } else { "" },
             gains.bandwidth_hz,
+            cycle,
             if gains.is_tuned { gains::TUNED_RULE } else { gains::DAMPING_RULE },
             gains::FRICTION_SHARE,
         );
