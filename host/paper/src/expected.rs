@@ -59,6 +59,11 @@ pub const EXPECTED: &[(&str, &str, Verdict)] = &[
     ("earlier-force", "*", Reproduced),
     ("earlier-pose", "*", NotReproduced),
     ("earlier-disturbs", "*", Reproduced),
+    // An arm with five joints, and fingers with four: see docs/paper.md.
+    ("manipulation", "hand-arm, 100 %", Reproduced),
+    ("manipulation", "hand-arm, torques", Reproduced),
+    ("manipulation", "*", Differs),
+    ("arm-takes-part", "hand-arm", Reproduced),
 ];
 
 /// A verdict that is not the one of the table.

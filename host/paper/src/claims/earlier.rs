@@ -14,7 +14,7 @@ const LEFT_ALONE: f64 = 1e-9;
 /// Relative poses that differ by less are the same, m.
 const SAME_M: f64 = 1e-4;
 
-fn row(run: &str, measured: String, verdict: Verdict) -> Row {
+pub(super) fn row(run: &str, measured: String, verdict: Verdict) -> Row {
     Row { run: run.to_owned(), measured, figures: Vec::new(), verdict, remark: String::new() }
 }
 

@@ -6,6 +6,7 @@ mod bound;
 mod earlier;
 mod energy;
 mod forces;
+mod moved;
 mod normal_only;
 mod reach;
 mod rest;
@@ -60,6 +61,8 @@ pub fn all(
         earlier::force(comparison),
         earlier::pose(comparison),
         earlier::disturbs(comparison),
+        moved::converges(comparison),
+        moved::arm(comparison),
     ])
 }
 

@@ -1,8 +1,8 @@
 //! Every check can fail: made-up samples that hold, and that do not.
 
 use super::*;
-use super::{arbitrary, bound, earlier, energy, forces, normal_only, reach, rest, start, wrench};
-use crate::earlier::{Carried, Final, Object};
+use super::{arbitrary, bound, earlier, energy, forces, moved, normal_only, reach, rest, start, wrench};
+use crate::earlier::{Carried, Final, Moved, Object, Off, SHARES, Stop};
 use crate::evidence::scene as load;
 use crate::laws::{Case, GAINS, Grasped, Law, Lost};
 use crate::polyhedra::{Outcome, Polyhedra};
@@ -339,6 +339,70 @@ fn the_earlier_law() {
     assert_eq!(cube([false, true, true]), Reproduced);
     assert_eq!((cube([true, true, true]), cube([false, true, false])), (NotReproduced, NotReproduced));
     assert_eq!(earlier::effective_on_the_cube(&of(Vec::new())).verdict, NotReproduced);
+}
+
+/// A hand under both laws and `u_s`, all of whose stops are this far off what was asked for, rad, and whose arm feels this much, N m.
+fn all_moved(run: &'static str, turns_rad: [f64; 3], arm_pull_nm: f64) -> Vec<Moved> {
+    let off = |turn_rad: f64| Off { way_m: 1e-3 * turn_rad, turn_rad };
+    let one = |(law, turn_rad): (Law, f64)| {
+        let (frame, object) = (off(turn_rad), off(4.0 * turn_rad));
+        let stop = |&share: &f64| Stop { share, frame, object, arm_pull_nm, moment_nm: 1.0 };
+        Moved {
+            run,
+            law,
+            gain: 0.3,
+            lost: None,
+            stops: SHARES.iter().map(stop).collect(),
+            asked: off(0.5),
+            by_arm: off(0.3),
+            by_fingers: off(0.2),
+            rolled_m: 1.0,
+            changed: turn_rad * turn_rad,
+        }
+    };
+    [Law::Attitudes, Law::Integral, Law::NormalOnly].into_iter().zip(turns_rad).map(one).collect()
+}
+
+#[test]
+fn what_is_moved() {
+    let share = |turns_rad, pull| moved::share_row(&all_moved("hand-arm", turns_rad, pull), 0.5).verdict;
+    assert_eq!(share([1e-4, 0.1, 0.0], 1.0), Reproduced);
+    assert_eq!(share([1e-4, 1e-5, 0.0], 1.0), NotReproduced, "nearer under the earlier law");
+    assert_eq!(
+        (share([0.1; 3], 0.01), share([0.1; 3], 0.5)),
+        (Differs, NotReproduced),
+        "the arm could do more"
+    );
+    assert_eq!(share([f64::NAN, 0.1, 0.0], f64::NAN), NotReproduced);
+
+    let torques = |turns_rad| moved::torques_row(&all_moved("hand-arm", turns_rad, 0.0)).verdict;
+    assert_eq!((torques([1e-4, 0.1, 0.0]), torques([0.1, 0.1, 0.0])), (Reproduced, NotReproduced));
+    assert_eq!(torques([1e-4, 1e-4, 0.0]), NotReproduced);
+
+    let object = |turn_rad| moved::object_row(&all_moved("hand-arm", [turn_rad, 0.1, 0.0], 0.0)).verdict;
+    assert_eq!([1e-4, 5e-3, 0.1].map(object), [Reproduced, Differs, NotReproduced]);
+    let mut still = all_moved("hand-arm", [5e-3, 0.1, 0.0], 0.0);
+    still[0].rolled_m = 0.0;
+    assert_eq!(moved::object_row(&still).verdict, NotReproduced, "nothing rolled");
+
+    let fingers = |turns_rad| moved::fingers_row(&all_moved("prism-ideal", turns_rad, 0.0)).verdict;
+    assert_eq!(fingers([1e-4, 0.1, 0.1]), Reproduced);
+    assert_eq!((fingers([0.1; 3]), fingers([0.1, 0.1, 0.01])), (Differs, NotReproduced), "u_st is why");
+
+    let mut both = all_moved("hand-arm", [1e-4, 0.1, 0.0], 0.0);
+    assert_eq!(moved::arm_row(&both).verdict, Reproduced);
+    both[0].by_fingers.way_m = 0.0;
+    assert_eq!(moved::arm_row(&both).verdict, NotReproduced, "by the arm alone");
+    assert_eq!(moved::arm_row(&all_moved("hand-arm", [0.1; 3], 0.0)).verdict, NotReproduced);
+
+    // Lost, or not run.
+    let mut lost = all_moved("hand-arm", [1e-4, 0.1, 0.0], 0.0);
+    lost[0].stops.clear();
+    for moved in [&lost[..], &[]] {
+        let rows = [moved::share_row(moved, 1.0), moved::torques_row(moved), moved::object_row(moved)];
+        let rows = rows.into_iter().chain([moved::fingers_row(moved), moved::arm_row(moved)]);
+        assert!(rows.map(|row| row.verdict).all(|verdict| verdict == NotReproduced));
+    }
 }
 
 /// A run that is not in the evidence is an error, not a claim that holds.

@@ -2,10 +2,10 @@
 
 use crate::evidence::{EvidenceError, scene, simulation};
 use crate::laws::{Law, Lost, built};
-use blindgrasp_body::MAX_JOINTS;
+use blindgrasp_body::{Hand, MAX_FINGERS, MAX_JOINTS, Posture};
 use blindgrasp_model::Scene;
 use blindgrasp_model::file::PushFile;
-use blindgrasp_shared::control::{Held, Latch, Stance};
+use blindgrasp_shared::control::{Held, Latch, Laws, Stance};
 use blindgrasp_sim::laws;
 use blindgrasp_sim::sample::Sample;
 use rayon::prelude::*;
@@ -47,19 +47,19 @@ impl Carried {
     }
 
     fn of(law: Law, gain: f64, scene: &Scene, run: &blindgrasp_sim::Run) -> Result<Self, EvidenceError> {
-        let hand = &scene.hand;
-        let fingers = hand.fingertip_count();
-        let arm: Vec<usize> =
-            (0..hand.joint_count()).filter(|&k| (0..fingers).all(|i| hand.moves(k, i))).collect();
-        let of_the_fingers = (0..hand.joint_count()).filter(|k| !arm.contains(k)).collect::<Vec<_>>();
+        let arm = arm_joints(&scene.hand);
+        let of_the_fingers = (0..scene.hand.joint_count()).filter(|k| !arm.contains(k)).collect::<Vec<_>>();
         let samples = &run.samples;
-        let torques = torques(scene, samples)?;
+        let Some(first) = samples.first() else { return Err(EvidenceError::of(RUN, "no samples")) };
+        let felt = Felt::of(scene, first)?;
+        let torques_nm = |sample: &Sample| felt.torques_nm(&sample.joint_angles_rad(), &Held::nothing());
+        let torques: Vec<_> = samples.iter().step_by(STRIDE).map(torques_nm).collect();
         let largest = |joints: &[usize]| {
             let all = torques.iter().flat_map(|torques| joints.iter().map(|&k| torques[k].abs()));
             all.fold(0.0, f64::max)
         };
         let turned = |sample: Option<&Sample>| {
-            samples.first().zip(sample).map_or(f64::NAN, |(first, now)| {
+            sample.map_or(f64::NAN, |now| {
                 arm.iter().map(|&k| (now.angles_rad[k] - first.angles_rad[k]).abs()).fold(0.0, f64::max)
             })
         };
@@ -75,22 +75,49 @@ impl Carried {
     }
 }
 
-/// Returns the torques of the law on the joints besides damping and weight, N m.
-fn torques(scene: &Scene, samples: &[Sample]) -> Result<Vec<[f64; MAX_JOINTS]>, EvidenceError> {
-    let laws = laws(scene).map_err(|cause| EvidenceError::of(RUN, cause))?;
-    let Some(first) = samples.first() else { return Ok(Vec::new()) };
-    let latch = Latch::of(&scene.hand, &first.posture(&scene.hand), &first.joint_angles_rad());
-    let still = [0.0; MAX_JOINTS];
-    let of = |sample: &Sample| {
-        let (posture, angles_rad) = (sample.posture(&scene.hand), sample.joint_angles_rad());
-        let (hand, held) = (&scene.hand, Held::nothing());
-        let stance =
-            Stance { hand, posture: &posture, angles_rad: &angles_rad, speeds_rad_s: &still, held: &held };
-        let all = |grip| laws.torques(&stance, grip).0;
-        let (with, without) = (all(Some(&laws.grip(&latch))), all(None));
+/// The joints that move every finger.
+pub(super) fn arm_joints(hand: &Hand) -> Vec<usize> {
+    (0..hand.joint_count()).filter(|&k| (0..hand.fingertip_count()).all(|i| hand.moves(k, i))).collect()
+}
+
+/// The law of a scene, from where it grasped.
+pub(super) struct Felt<'a> {
+    scene: &'a Scene,
+    laws: Laws<f64, MAX_JOINTS>,
+    pub(super) latch: Latch<f64, MAX_JOINTS, MAX_FINGERS>,
+}
+
+impl<'a> Felt<'a> {
+    pub(super) fn of(scene: &'a Scene, first: &Sample) -> Result<Self, EvidenceError> {
+        let laws = laws(scene).map_err(|cause| EvidenceError::of(&scene.name, cause))?;
+        let latch = Latch::of(&scene.hand, &first.posture(&scene.hand), &first.joint_angles_rad());
+        Ok(Self { scene, laws, latch })
+    }
+
+    pub(super) fn posture(&self, angles_rad: &[f64; MAX_JOINTS]) -> Posture {
+        let mut posture = Posture::at_base();
+        self.scene.hand.forward_kinematics(angles_rad, &mut posture);
+        posture
+    }
+
+    /// Returns the torques on the joints besides damping and weight, N m.
+    pub(super) fn torques_nm(
+        &self,
+        angles_rad: &[f64; MAX_JOINTS],
+        held: &Held<f64, MAX_FINGERS>,
+    ) -> [f64; MAX_JOINTS] {
+        let (posture, speeds_rad_s) = (self.posture(angles_rad), [0.0; MAX_JOINTS]);
+        let stance = Stance {
+            hand: &self.scene.hand,
+            posture: &posture,
+            angles_rad,
+            speeds_rad_s: &speeds_rad_s,
+            held,
+        };
+        let all = |grip| self.laws.torques(&stance, grip).0;
+        let (with, without) = (all(Some(&self.laws.grip(&self.latch))), all(None));
         std::array::from_fn(|k| with[k] - without[k])
-    };
-    Ok(samples.iter().step_by(STRIDE).map(of).collect())
+    }
 }
 
 /// Pushes the object in the hand, under each law.

@@ -5,13 +5,16 @@
 //! - `objects`: what is held, under each law.
 //! - `figure` draws the first of these.
 //! - `arm`: what an arm feels of each law, when the object is pushed in its hand.
+//! - `moved`: what is held is moved by position and attitude, beside each law.
 
 mod arm;
 mod figure;
+mod moved;
 mod objects;
 mod paths;
 
 pub use arm::Carried;
+pub use moved::{Moved, Off, SHARES, Stop};
 pub use objects::Object;
 pub use paths::{Final, GAINS, PATHS};
 
@@ -28,11 +31,13 @@ pub struct Comparison {
     pub objects: Vec<Object>,
     /// Of the hand-arm.
     pub arm: Vec<Carried>,
+    /// Of what is moved.
+    pub moved: Vec<Moved>,
 }
 
 /// Returns the number of runs.
 pub fn runs() -> usize {
-    paths::plan().len() + objects::SHAPES.len() + arm::LAWS.len()
+    paths::plan().len() + objects::SHAPES.len() + arm::LAWS.len() + moved::runs()
 }
 
 impl Comparison {
@@ -42,7 +47,12 @@ impl Comparison {
     /// A scene or a run that can't be done.
     pub fn gather(told: &(dyn Fn(&str) + Sync)) -> Result<Self, EvidenceError> {
         // The long ones first.
-        Ok(Self { arm: arm::carry(told)?, paths: paths::follow(told)?, objects: objects::grasp(told)? })
+        Ok(Self {
+            moved: moved::go(told)?,
+            arm: arm::carry(told)?,
+            paths: paths::follow(told)?,
+            objects: objects::grasp(told)?,
+        })
     }
 
     /// The ends of all paths under a law with a gain.

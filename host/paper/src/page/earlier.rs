@@ -19,7 +19,8 @@ pub(super) fn section(comparison: &Comparison, polyhedra: &Polyhedra) -> Markup 
                 "References 14 and 15 have an integral of each joint's velocity where the paper has " i { "u_st" } ". The paper says what \
                  speaks against it, and does not show it. Its words are claims here ("
                 a href="#claim-earlier-pose" { "pose" } ", " a href="#claim-earlier-force" { "force" } ", "
-                a href="#claim-earlier-disturbs" { "disturbance" } ", " a href="#claim-earlier-expanded" { "shapes" }
+                a href="#claim-earlier-disturbs" { "disturbance" } ", " a href="#claim-earlier-expanded" { "shapes" } ", "
+                a href="#claim-manipulation" { "manipulation" }
                 "); " a href="#fig-earlier-law" { "the figure" } " shows pose and force by the way that the grasp took, over the gains; the \
                  table, what each law holds."
             }
