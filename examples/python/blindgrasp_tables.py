@@ -143,6 +143,7 @@ PARAMETERS = [
     "carrying.speed_rad_s",
     "carrying.integral_n",
     "carrying.correction_hz",
+    "carrying.still_m",
     "carrying.put_down_m_s",
     "carrying.put_down_m",
     "carrying.put_down_n",
