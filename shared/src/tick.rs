@@ -471,7 +471,10 @@ fn object<const J: usize, const F: usize>(
                 Some(Refusal::NotFinite)
             } else if of_other_laws.any(|(gain, _)| gain.is_some_and(|gain| gain != 0.0)) {
                 Some(Refusal::LawNotChosen)
-            } else if params.prepared.limits.forbidden(&gains).is_some() {
+            } else if params.prepared.limits.forbidden(&gains).is_some()
+                || (params.prepared.ramps.has().closing && !(gains.grasp[0] > 0.0))
+            {
+                // Fingertips that close on something and then press with nothing hold nothing.
                 Some(Refusal::OutOfRange)
             } else {
                 // To be told that it is done would be wrong for a grasp of other gains.
@@ -517,7 +520,7 @@ fn act<const J: usize, const F: usize>(
 ) {
     let ramps = &params.prepared.ramps;
     if state.supervisor.drive(ramps) == Drive::Off {
-        state.latch = None;
+        (state.latch, state.cycle.begun) = (None, state.supervisor.mode());
         return;
     }
     params.hand.forward_kinematics(&state.motion.angles_rad, &mut state.posture);
