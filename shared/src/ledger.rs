@@ -158,6 +158,11 @@ impl<const J: usize> Ledger<J> {
         }
     }
 
+    /// Potential of the laws in the last tick, but for the spring that pulls what is held to its place, J.
+    pub(crate) fn of_the_grip_j(&self) -> f32 {
+        self.terms.iter().fold(0.0, |sum, term| sum + term.potential_j) - self.terms.frame[0].potential_j
+    }
+
     /// Begins the sums anew, with a grasp.
     pub fn open(&mut self) {
         self.work = Sum::zero();

@@ -118,21 +118,31 @@ fn moved(name: &str, settings: &[&str], order: &str, way_m: Vector3<f64>) -> Mov
     }
 }
 
-/// Weighed by a slow stroke, to 15 g.
+/// Weighed by a slow stroke, to 15 g, where it began to be held, and up there.
 #[test]
 fn weight_is_told() {
-    for (grams, force_n) in [(2.1, 5.0), (20.0, 5.0), (100.0, 5.0), (100.0, 10.0), (200.0, 10.0)] {
+    for (name, grams, force_n, up_mm) in [
+        ("pick-prism", 2.1, 5.0, 0),
+        ("pick-prism", 20.0, 5.0, 0),
+        ("pick-prism", 100.0, 5.0, 0),
+        ("pick-prism", 100.0, 10.0, 0),
+        ("pick-prism", 200.0, 10.0, 0),
+        ("pick-prism", 100.0, 5.0, 30),
+        ("pick-cube", 100.0, 5.0, 0),
+        ("pick-cube", 100.0, 5.0, 15),
+    ] {
         let (mass, force) =
             (format!("object.mass_kg={}", grams * 1e-3), format!("control.force_n={force_n}"));
-        let weigh = ("weigh", Some("holding"), 6.0);
-        let scene = scene("pick-prism", &[&mass, &force, "duration_s=9.5"], &[LIFTED[0], LIFTED[1], weigh]);
+        let up = format!("move z_mm={}", -up_mm);
+        let steps = [LIFTED[0], LIFTED[1], (&*up, Some("holding"), 6.0), ("weigh", Some("at-target"), 8.0)];
+        let scene = scene(name, &[&mass, &force, "duration_s=12"], &steps);
         let mut weight_n = 0.0;
         let summary = watch(&scene, |_, simulation| {
             weight_n = simulation.controller().record().map_or(0.0, |record| f64::from(record.weight_n));
         });
         assert!(summary.fault.is_none(), "{summary:?}");
         let told = weight_n / 9.81 * 1e3;
-        println!("{grams} g: told as {told:.1} g");
+        println!("{name}, {grams} g, {force_n} N, {up_mm} mm up: told as {told:.1} g");
         assert!(summary.noticed.iter().any(|(_, words)| words == Notice::Weighed.words()));
         assert!((told - grams).abs() < 15.0, "{grams} g: {told}");
     }

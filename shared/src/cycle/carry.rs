@@ -155,6 +155,8 @@ pub(crate) struct Carry<const F: usize> {
     lifted_m: f32,
     /// Heights of frame and object in the tick before, m.
     heights_m: [f32; 2],
+    /// What the other springs of the grip had stored in it, J: it is not the weight that takes the work of these.
+    grip_j: f32,
     /// Depth to which the target has sunk, m.
     sunk_m: f32,
     /// The last weight, N.
@@ -190,6 +192,7 @@ impl<const F: usize> Carry<F> {
             work_j: 0.0,
             lifted_m: 0.0,
             heights_m: [0.0; 2],
+            grip_j: 0.0,
             sunk_m: 0.0,
             weight_n: 0.0,
         }
@@ -284,6 +287,7 @@ impl<const F: usize> Carry<F> {
         stance: (&Hand<f32, J, F>, &Posture<f32, J, F>),
         latch: &Latch<f32, J, F>,
         (stiffness_n_m, up): (f32, Option<Vector3<f32>>),
+        grip_j: f32,
         held: &mut Held<f32, F>,
     ) -> Carried {
         let (hand, posture) = stance;
@@ -347,10 +351,11 @@ impl<const F: usize> Carry<F> {
                 if matches!(eighth, 1 | 2 | 5 | 6) {
                     let sign = if eighth < 4 { 1.0 } else { -1.0 };
                     let [frame_m, object_m] = self.heights_m;
-                    self.work_j += sign * pull_n(&way_m) * (heights_m[0] - frame_m);
+                    self.work_j +=
+                        sign * (pull_n(&way_m) * (heights_m[0] - frame_m) - (grip_j - self.grip_j));
                     self.lifted_m += sign * (heights_m[1] - object_m);
                 }
-                self.heights_m = heights_m;
+                (self.heights_m, self.grip_j) = (heights_m, grip_j);
                 if at >= stroke + settle {
                     // Without a way there is no weight.
                     let is_lifted = self.lifted_m > LEAST_LIFT_M;
@@ -412,8 +417,8 @@ impl<const F: usize> Carry<F> {
         to.u8(self.work as u8)?;
         to.u32(self.age)?;
         to.f32s(&self.heights_m, 2)?;
-        let Self { least_m2, work_j, lifted_m, sunk_m, weight_n, .. } = *self;
-        to.f32s(&[least_m2, work_j, lifted_m, sunk_m, weight_n], 5)
+        let Self { least_m2, work_j, grip_j, lifted_m, sunk_m, weight_n, .. } = *self;
+        to.f32s(&[least_m2, work_j, grip_j, lifted_m, sunk_m, weight_n], 6)
     }
 
     pub(crate) fn load(fingertips: usize, from: &mut Loader<'_>) -> Result<Self, SnapshotError> {
@@ -438,8 +443,8 @@ impl<const F: usize> Carry<F> {
         };
         carry.age = from.u32()?;
         from.f32s(&mut carry.heights_m, 2)?;
-        let Self { least_m2, work_j, lifted_m, sunk_m, weight_n, .. } = &mut carry;
-        for number in [least_m2, work_j, lifted_m, sunk_m, weight_n] {
+        let Self { least_m2, work_j, grip_j, lifted_m, sunk_m, weight_n, .. } = &mut carry;
+        for number in [least_m2, work_j, grip_j, lifted_m, sunk_m, weight_n] {
             *number = from.f32()?;
         }
         Ok(carry)

@@ -191,7 +191,7 @@ fn close<const J: usize, const F: usize>(
 #[inline(never)]
 fn hold<const J: usize, const F: usize>(params: &Params<J, F>, state: &mut State<J, F>) -> Option<Noticed> {
     let Prepared { config, period, up, ramps, .. } = &params.prepared;
-    let State { cycle, posture, motion, supervisor, latch, grasp, .. } = state;
+    let State { cycle, posture, motion, supervisor, latch, grasp, ledger, .. } = state;
     let hand = &params.hand;
     if supervisor.drive(ramps) == Drive::Close {
         if !cycle.retreats {
@@ -221,6 +221,7 @@ fn hold<const J: usize, const F: usize>(params: &Params<J, F>, state: &mut State
             (hand, posture),
             latch,
             (stiffness_n_m, *up),
+            ledger.of_the_grip_j(),
             &mut cycle.held,
         )
     } else {
