@@ -163,6 +163,18 @@ pub(crate) struct Carry<const F: usize> {
     weight_n: f32,
 }
 
+/// Returns the sum of the squares of the fingertips' distances from their centroid, m^2.
+#[inline(never)]
+fn spread_m2<const J: usize, const F: usize>(hand: &Hand<f32, J, F>, posture: &Posture<f32, J, F>) -> f32 {
+    let count = hand.fingertip_count();
+    let (mut sum, mut squares) = (Vector3::zeros(), 0.0);
+    for centre in posture.centres_m.iter().take(count) {
+        sum += centre;
+        squares += dot(centre, centre);
+    }
+    squares - dot(&sum, &sum) / (count as f32)
+}
+
 /// Returns where the object was touched, from a fingertip's centre, m: by where that is now if it turned with the object, and if it
 /// turned with the fingertip. A fingertip that has rolled on a face by an angle has left the point of the face behind by the arc,
 /// and touches the face no higher than before; where it touched first it has lifted from the face.
@@ -226,16 +238,13 @@ impl<const F: usize> Carry<F> {
 
     /// The grasp has its full force: by as much as the fingertips have come together since the latch, on a rigid object, they are
     /// pressed in, and roll on a radius that is shorter.
-    pub(crate) fn press_in<const J: usize>(
-        &mut self,
-        hand: &Hand<f32, J, F>,
-        posture: &Posture<f32, J, F>,
-        latch: &Latch<f32, J, F>,
-    ) {
-        let count = hand.fingertip_count();
-        let now = frame::Latch::<f32, 0, F>::of_points(&posture.centres_m, count);
-        let all = latch.frame.arms_m.iter().zip(&now.arms_m).take(count);
-        let closer_m = all.fold(0.0, |sum, (before, now)| sum + norm(before) - norm(now)) / count as f32;
+    pub(crate) fn press_in<const J: usize>(&mut self, hand: &Hand<f32, J, F>, posture: &Posture<f32, J, F>) {
+        let count = hand.fingertip_count() as f32;
+        if !(self.least_m2 > 0.0) {
+            return;
+        }
+        let before_m = (self.least_m2 / count).square_root() + SHRINK_M;
+        let closer_m = before_m - (spread_m2(hand, posture) / count).square_root();
         for (touch, fingertip) in self.touches_m.iter_mut().zip(hand.prepared_fingertips()) {
             *touch *= 1.0 - (closer_m / fingertip.radius_m).limited(0.0, PRESSED_MOST);
         }
@@ -393,13 +402,7 @@ impl<const F: usize> Carry<F> {
         hand: &Hand<f32, J, F>,
         posture: &Posture<f32, J, F>,
     ) -> bool {
-        let count = hand.fingertip_count();
-        let (mut sum, mut squares) = (Vector3::zeros(), 0.0);
-        for centre in posture.centres_m.iter().take(count) {
-            sum += centre;
-            squares += dot(centre, centre);
-        }
-        squares - dot(&sum, &sum) / (count as f32) < self.least_m2 || super::closing::are_close(hand, posture)
+        spread_m2(hand, posture) < self.least_m2 || super::closing::are_close(hand, posture)
     }
 
     pub(crate) fn save(&self, fingertips: usize, to: &mut Saver<'_>) -> Result<(), BufferTooSmall> {

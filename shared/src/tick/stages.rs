@@ -238,7 +238,7 @@ fn hold<const J: usize, const F: usize>(params: &Params<J, F>, state: &mut State
         if carries && !supervisor.ramps(ramps) {
             supervisor.notice(Event::Firm);
             cycle.begun = Mode::Carrying;
-            cycle.carry.press_in(hand, posture, latch);
+            cycle.carry.press_in(hand, posture);
             return Some(Noticed::of_hand(Notice::Holding));
         }
         return None;
