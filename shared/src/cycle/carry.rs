@@ -295,8 +295,7 @@ impl<const F: usize> Carry<F> {
         period: Period,
         stance: (&Hand<f32, J, F>, &Posture<f32, J, F>),
         latch: &Latch<f32, J, F>,
-        (stiffness_n_m, up): (f32, Option<Vector3<f32>>),
-        grip_j: f32,
+        (stiffness_n_m, up, grip_j): (f32, Option<Vector3<f32>>, f32),
         held: &mut Held<f32, F>,
     ) -> Carried {
         let (hand, posture) = stance;

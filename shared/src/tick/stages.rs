@@ -220,8 +220,7 @@ fn hold<const J: usize, const F: usize>(params: &Params<J, F>, state: &mut State
             *period,
             (hand, posture),
             latch,
-            (stiffness_n_m, *up),
-            ledger.of_the_grip_j(),
+            (stiffness_n_m, *up, ledger.of_the_grip_j()),
             &mut cycle.held,
         )
     } else {
