@@ -29,8 +29,9 @@ use blindgrasp_sim::motors::Motors;
 use blindgrasp_sim::verdict::Judge;
 use blindgrasp_wire::Packet;
 
-/// Time that putting the object back takes, s.
-const PUT_BACK_S: f64 = 1.0;
+/// Time that putting the object back takes, s: less than an open hand takes from being armed until its fingertips could seem to touch,
+/// so that none closes on what is not back yet.
+const PUT_BACK_S: f64 = 0.2;
 /// Time for which an encoder fails, s.
 const FAILURE_S: f64 = 0.1;
 
@@ -414,6 +415,25 @@ mod tests {
         bench.run(1100);
         assert!(matches!(bench.happened[1..], [Happening::LetGo, Happening::PutBack]));
         assert_eq!(bench.counts, start);
+    }
+
+    /// Armed at once after it was stopped, before everything is back, a hand takes nothing for an object.
+    #[test]
+    fn a_hand_that_is_armed_at_once_grasps_what_is_there() {
+        let mut bench = Bench::of("pick-cube", &[]);
+        for _ in 0..3 {
+            bench.happened.clear();
+            bench.command(Command::Arm);
+            bench.command(Command::Posture { posture: Some(1), time_ms: 0 });
+            until(&mut bench, Notice::InPosture);
+            bench.command(Command::Grasp(Grasp::CONFIGURED));
+            until(&mut bench, Notice::Holding);
+            bench.command(Command::Move(Move { position_m: [0.0, 0.0, -0.015], ..Move::default() }));
+            until(&mut bench, Notice::AtTarget);
+            assert_eq!(bench.run(500), Mode::Carrying);
+            assert!(matches!(bench.happened[..], [] | [Happening::PutBack]), "{:?}", bench.happened);
+            bench.command(Command::Stop);
+        }
     }
 
     /// The device's own estimator undoes what the encoders do.

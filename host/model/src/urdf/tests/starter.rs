@@ -96,7 +96,7 @@ fn a_file_says_what_is_guessed() {
             "fingertip on link `left-tip`; its centre: a sphere of the link; its radius of 0.01 m: a sphere of the link",
             "fingertip on link `right-tip`; its centre: a sphere of the link; its radius of 0.01 m: a sphere of the link",
             "friction of `left-knuckle`, `right-base`, `right-knuckle`",
-            "gains: force 6.1 N, attitude stiffness 0.0041 N m, closing, virtual frame, damping; encoders; torques per volt; stiffness of the fingertips",
+            "gains: force 6.1 N, attitude stiffness 0.0041 N m, closing, damping; encoders; torques per volt; stiffness of the fingertips",
         ]
     );
     // What the URDF knows is not repeated.
