@@ -821,6 +821,8 @@ fn commands_of_the_cycle_that_can_not_be_done_are_refused_by_name() {
     };
     let posture = |posture, time_ms| Command::Posture { posture, time_ms };
     let (none, nan) = ([0.0; 3], f32::NAN);
+    let mut weak = Grasp::CONFIGURED;
+    weak.gains.grasp[0] = Some(0.0);
     let cases = [
         (Mode::Armed, Command::Move(way), Refusal::NotCarrying),
         (Mode::Armed, Command::PutDown, Refusal::NotCarrying),
@@ -828,6 +830,8 @@ fn commands_of_the_cycle_that_can_not_be_done_are_refused_by_name() {
         (Mode::Armed, posture(None, 0), Refusal::NoPath),
         (Mode::Disarmed, posture(None, 0), Refusal::NotArmed),
         (Mode::Moving, posture(Some(3), 0), Refusal::NoSuchPosture),
+        // With no force fingertips would close, and then hold nothing.
+        (Mode::Closing, Command::Grasp(weak), Refusal::OutOfRange),
         (Mode::Moving, Command::Aim { joint: 12, angle_rad: 0.0 }, Refusal::NoSuchJoint),
         (Mode::Moving, Command::Aim { joint: 0, angle_rad: nan }, Refusal::NotFinite),
         // Within the range of 2 rad, but in the end stop's margin.
@@ -867,6 +871,21 @@ fn commands_of_the_cycle_that_can_not_be_done_are_refused_by_name() {
         let refused = output.record.answer.and_then(|answer| answer.refused);
         assert_eq!(refused, Some(Refusal::NoGravity), "{command:?}");
     }
+}
+
+/// A grasp that ended in a fault was not let go, and the next arming does not say so.
+#[test]
+fn a_fault_is_not_told_as_a_release() {
+    let params = params_for(Mode::Releasing);
+    let (mut state, counts) = (in_mode(&params, Mode::Releasing), counts_in(Mode::Releasing));
+    let failed = Raised::at(0, Fault::SampleMissing);
+    let output = tick(&params, &mut state, &Input::failed(failed, None));
+    assert_eq!(output.record.mode, Mode::Fault);
+    for command in [Some(Command::ClearFault), Some(Command::Arm), None, None] {
+        let output = tick(&params, &mut state, &Input::counts(&counts, command));
+        assert_eq!(output.record.notice, None, "{command:?}");
+    }
+    assert_eq!(state.mode(), Mode::Armed);
 }
 
 /// A million ticks of commands in any order, of joints that shake, in all modes: no torque changes by more than its slew limit, but to

@@ -89,7 +89,7 @@ fn what_is_held_goes_where_it_is_asked_to() {
 
 /// The end of a movement.
 struct Moved {
-    /// How far the frame of the fingertips' centres is from the way that was asked for, m.
+    /// Distance of the frame of the fingertips' centres from where it was asked to be, m.
     off_m: f64,
     /// By how much that has turned, and the object: as it is told, and in truth, degrees.
     frame_deg: f64,

@@ -183,7 +183,7 @@ fn slews(config: &Config<MAX_JOINTS>, outcome: &Outcome, until: u64) {
     }
 }
 
-/// What is stored only falls from a tick on, but for what the friction of the joints had stored, and what was given.
+/// Stored energy only falls from a tick on, but for what the friction of the joints had stored, and what was given.
 fn energy_falls(scene: &Scene, outcome: &Outcome, from: u64) {
     let mut least_j = f64::INFINITY;
     for sample in &outcome.run.samples[from as usize..] {
@@ -194,7 +194,7 @@ fn energy_falls(scene: &Scene, outcome: &Outcome, from: u64) {
     }
 }
 
-/// What the tries are made with.
+/// The means of a try.
 struct Bench<'a> {
     scene: &'a Scene,
     config: Config<MAX_JOINTS>,

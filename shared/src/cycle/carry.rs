@@ -155,7 +155,7 @@ pub(crate) struct Carry<const F: usize> {
     lifted_m: f32,
     /// Heights of frame and object in the tick before, m.
     heights_m: [f32; 2],
-    /// What the other springs of the grip had stored in it, J: it is not the weight that takes the work of these.
+    /// Energy in the other springs of the grip then, J: it is not the weight that takes their work.
     grip_j: f32,
     /// Depth to which the target has sunk, m.
     sunk_m: f32,

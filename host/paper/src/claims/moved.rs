@@ -1,4 +1,4 @@
-//! What is held is moved, beside each law (Sec. 1, advantages 4 and 6).
+//! The held object is moved, beside each law (Sec. 1, advantages 4 and 6).
 
 use super::earlier::row;
 use crate::claim::{Claim, Figure, Row, Verdict, number};
